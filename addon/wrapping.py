@@ -2,8 +2,10 @@
 """Chooses, breaks and shortens text so that it fits the region that is drawn: the sidebar, or the preferences."""
 
 import re
+import textwrap
 
 import blf
+import bpy
 
 _FONT = 0  # Blender's own
 # Pixels of the region's width that tabs, margins and the icon take from the text of a label.
@@ -21,6 +23,13 @@ def _room(context):
     return max(context.region.width, 100) - _BESIDE_TEXT * scale
 
 
+def _room_in_box(context, share):
+    """Does the same for a text that has this share of a box's width."""
+    _room(context)
+    scale = context.preferences.system.ui_scale
+    return share * (max(context.region.width, 100) - _BESIDE_BOX * scale) - _BESIDE_LABEL * scale
+
+
 def _width(text):
     return blf.dimensions(_FONT, text)[0]
 
@@ -30,10 +39,7 @@ def fitting(context, *texts, share=None):
 
     share: the part of a box's width that is for the text, if a name stands beside it.
     """
-    room = _room(context)
-    if share is not None:
-        scale = context.preferences.system.ui_scale
-        room = share * (max(context.region.width, 100) - _BESIDE_BOX * scale) - _BESIDE_LABEL * scale
+    room = _room(context) if share is None else _room_in_box(context, share)
     return next((text for text in texts if _width(text) <= room), texts[-1])
 
 
@@ -60,19 +66,55 @@ def _shortened(line, room):
 
 
 _BESIDE_FIELD = 0.4  # the share of the width that Blender gives to the name of a property beside its field
+# Pixels that the arrow of a menu takes from the choice beside it, and a box to be ticked from its text.
+_ARROW, _TICK = 16, 22
+
+
+def _fits_field(context, text, taken):
+    """Whether a text has room in a field beside a name. taken: pixels of the field that are for something else."""
+    room = _room_in_box(context, 1 - _BESIDE_FIELD) - taken * context.preferences.system.ui_scale
+    return _width(text) <= room
+
+
+def fits_tick(context, text):
+    """Whether the text of a box to be ticked has room beside the name of a row."""
+    return _fits_field(context, text, _TICK)
+
+
+def _fits(context, known):
+    """Whether the name of a property has room beside its field, and each choice of a menu in the field."""
+    if not fitting(context, known.name, "", share=_BESIDE_FIELD):
+        return False
+    choices = known.enum_items if known.type == "ENUM" and not known.is_enum_flag else ()
+    return all(_fits_field(context, choice.name, _ARROW) for choice in choices)
 
 
 def property_fields(context, layout, settings, *names):
-    """Draws properties, each with its name beside its field, or above it if the name has no room there."""
+    """Draws properties, each with its name beside its field, or above it if there is no room."""
     for name in names:
-        title = settings.rna_type.properties[name].name  # bl_rna of an operator does not list its properties.
-        if fitting(context, title, "", share=_BESIDE_FIELD):
-            layout.prop(settings, name)
+        known = settings.rna_type.properties[name]  # bl_rna of an operator does not list its properties.
+        if _fits(context, known):
+            layout.row(align=True).prop(
+                settings, name
+            )  # In a row, the buttons of several choices are beside each other.
             continue
         column = layout.column(align=True)
         column.use_property_split = False
-        column.label(text=title)
-        column.row(align=True).prop(settings, name, text="")
+        column.label(text=known.name)
+        named = {"expand": True} if known.type == "ENUM" and known.is_enum_flag else {"text": ""}
+        column.row(align=True).prop(settings, name, **named)
+
+
+_POPUP = 100  # characters in a line
+
+
+def popup_text(text):
+    """Returns the text of an error in lines for Blender's popup, which is cut off at the edge of the window. A script gets it
+    in one line."""
+    if bpy.app.background:
+        return text
+    # In the status bar Blender leaves out the end of a line.
+    return " \n".join(textwrap.wrap(text, _POPUP, break_long_words=False, break_on_hyphens=False))
 
 
 def text_lines(context, layout, text, icon):

@@ -15,7 +15,7 @@ from ..properties import automatic_placement, placement_setting, tolerance_setti
 from ..reference import snapshots, tolerances
 from ..shared.errors import Refused
 from ..shared.proof import report
-from ..wrapping import property_fields
+from ..wrapping import fits_tick, property_fields
 from . import decimation, original
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
@@ -44,16 +44,21 @@ def draw_advanced_settings(context, layout, settings):
     property_fields(context, layout, settings, "crossings", "max_normal_angle")
 
 
-def draw_protect_settings(layout, settings, ob):
+def draw_protect_settings(context, layout, settings, ob):
     """Draws the settings of the protected elements, for the panel and for Adjust Last Operation."""
-    layout.row(heading="Faces").prop(settings, "only_selected", text="Unselected")
+    if fits_tick(context, "Unselected"):
+        layout.row(heading="Faces").prop(settings, "only_selected", text="Unselected")
+    else:
+        row = layout.row()
+        row.use_property_split = False
+        row.prop(settings, "only_selected", text="Unselected Faces")
     column = layout.column(align=True)
     column.label(text="Edges")
     grid = column.grid_flow(columns=2, row_major=True, align=True)
     grid.use_property_split = False
     for kind, *_ in PROTECTED:
         grid.prop_enum(settings, "protect", kind)
-    layout.row(align=True).prop(settings, "symmetry")
+    property_fields(context, layout, settings, "symmetry")
     shared.draw_vertex_group(layout, settings, ob)
 
 
@@ -110,7 +115,7 @@ object. An object without a reference gets one first, as by Set Reference"""
         column.prop(self, "tolerance_mode", text=" ")
         layout.prop(self, "keep")
         draw_decimate_settings(layout, self)
-        draw_protect_settings(layout, self, context.active_object)
+        draw_protect_settings(context, layout, self, context.active_object)
         layout.prop(self, "outside")
         draw_advanced_settings(context, layout, self)
 

@@ -27,7 +27,7 @@ class TOLVOL_PT_protect(SubPanel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        draw_protect_settings(layout, active(context).tolvol, active(context))
+        draw_protect_settings(context, layout, active(context).tolvol, active(context))
 
 
 class TOLVOL_PT_advanced(SubPanel, bpy.types.Panel):

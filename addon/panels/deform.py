@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
+from ..wrapping import property_fields
 from .layout import SubPanel, active
 
 
@@ -14,5 +15,5 @@ class TOLVOL_PT_deform(SubPanel, bpy.types.Panel):
         layout.use_property_decorate = False
         settings = active(context).tolvol
         layout.prop(settings, "lattice")
-        layout.prop(settings, "deform_mode")
+        property_fields(context, layout, settings, "deform_mode")
         layout.operator("tolvol.deform", text="Deform")

@@ -11,7 +11,7 @@ from ..overlay import reasons
 from ..proof import labels, probing, statistics, verdict
 from ..shared.proof import report
 from ..units import length
-from ..wrapping import fitting, text_lines, wrapped
+from ..wrapping import fitting, property_fields, text_lines, wrapped
 from .layout import GHOST, GREEN, GREY, RED, SubPanel, active, is_narrow, right
 from .progress import draw_progress
 
@@ -27,7 +27,8 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
             draw_progress(context, box, run.told())
         else:
             _draw_verdict(context, box, ob, verdict.of(ob))
-        row = layout.row(align=True)
+        # A narrow sidebar has no room for the two names beside each other.
+        row = layout.column(align=True) if is_narrow(context) else layout.row(align=True)
         row.operator("tolvol.check")
         row.operator("tolvol.select_outside")
         row = layout.row(align=True)
@@ -95,6 +96,8 @@ def _row(context, column, name, *texts):
 def _why_not_checked(ob):
     if measuring.wanted(ob):
         return measuring.failure(ob) or "Being measured"
+    if ob.tolvol.snapshot is None and not blocked.decimate_blocked(ob):
+        return "Press Decimate, or set the reference first"  # The first operation sets it, too.
     return blocked.check_blocked(ob) or "Press Check to measure it"
 
 
@@ -110,11 +113,14 @@ class TOLVOL_PT_objects(SubPanel, bpy.types.Panel):
 
     def draw(self, context):
         rows = verdicts(_listed(context))
-        column = self.layout.column(align=True)
+        column, narrow = self.layout.column(align=True), is_narrow(context)
         for name, word, share in rows[:_MOST_LISTED]:
-            row = column.split(factor=0.5)
+            row = column.split(factor=0.6 if narrow else 0.5)
             row.label(text=name, icon=_ICONS_OF[word])
-            right(row, word if share is None or is_narrow(context) else f"{word}  {share}")
+            if share is None:
+                right(row, "\u2013" if narrow else word)  # A narrow sidebar has no room for both words of NOT CHECKED.
+            else:
+                right(row, word if narrow else f"{word}  {share}")
         if rest := [word for _, word, _ in rows[_MOST_LISTED:]]:
             more = ", ".join(f"{rest.count(word):,} {word}" for word in _ICONS_OF if word in rest)
             text_lines(context, column, f"and {more}", "BLANK1")
@@ -163,8 +169,7 @@ class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):
         column.prop(ob.tolvol, "deviation_opacity")
         legend = column.column()
         legend.use_property_split, legend.use_property_decorate = True, False
-        legend.prop(ob.tolvol, "deviation_palette")
-        legend.prop(ob.tolvol, "deviation_range")
+        property_fields(context, legend, ob.tolvol, "deviation_palette", "deviation_range")
         if ob.tolvol.deviation_range == "FIXED":
             legend.prop(ob.tolvol, "deviation_limit")
         row = legend.row(heading="Bands", align=True)

@@ -5,7 +5,7 @@ from ..files.gltf_extras import GEOMETRIC_ERROR
 from ..mesh.mesh_io import triangle_count
 from ..operators.lod import chain, draw_lod_settings
 from ..units import length
-from .layout import SubPanel, active, right
+from .layout import SubPanel, active, is_narrow, right
 
 
 class TOLVOL_PT_lod(SubPanel, bpy.types.Panel):
@@ -22,20 +22,36 @@ class TOLVOL_PT_lod(SubPanel, bpy.types.Panel):
         settings = made[0].tolvol.lod
         draw_lod_settings(layout, settings)
         layout.operator("tolvol.make_lods")
-        # Each level has its row before it is made, so that no panel below moves.
+        # Each level has its rows before it is made, so that no panel below moves.
         column = layout.column(align=True)
         for i in range(max(settings.levels + 1, len(made))):
-            row = column.row()
-            if i >= len(made):
-                row.label(text=f"LOD{i}", icon="HIDE_ON")
-                right(row, "\u2013")
-                continue
-            level = made[i]
-            button = row.row()
-            button.alignment, button.enabled = "LEFT", len(made) > 1
-            icon = "HIDE_OFF" if level.visible_get() else "HIDE_ON"
-            name = level.name.removeprefix(f"{made[0].name}_")
-            button.operator("tolvol.show_level", text=name, icon=icon, emboss=False).level = i
-            right(row, f"{triangle_count(level.data):,}" if level.type == "MESH" else "")
-            error = level.get(GEOMETRIC_ERROR)
-            right(row, length(context, error) if isinstance(error, float) else "\u2013")
+            _draw_level(context, column, made, i)
+
+
+_NAME = 0.36  # the part of a row that is for the name of a level
+
+
+def _draw_level(context, column, made, i):
+    """Draws the name of a level, its triangles and its deviation, which has a row of its own in a narrow sidebar."""
+    narrow = is_narrow(context)
+    row = column.row() if narrow or not i else column.split(factor=_NAME)
+    if i < len(made):
+        level = made[i]
+        button = row.row()
+        button.alignment, button.enabled = "LEFT", len(made) > 1
+        icon = "HIDE_OFF" if level.visible_get() else "HIDE_ON"
+        name = level.name.removeprefix(f"{made[0].name}_")
+        button.operator("tolvol.show_level", text=name, icon=icon, emboss=False).level = i
+        triangles = f"{triangle_count(level.data):,}" if level.type == "MESH" else ""
+        error = level.get(GEOMETRIC_ERROR)
+        deviation = length(context, error) if isinstance(error, float) else "\u2013"
+    else:
+        row.label(text=f"LOD{i}", icon="HIDE_ON")
+        triangles, deviation = "", "\u2013"
+    if narrow:
+        right(row, triangles)
+        if i:  # The object itself has no deviation.
+            right(column, deviation)
+    else:
+        # Two labels would leave each other too little room.
+        right(row, f"{triangles}  {deviation}")

@@ -2,7 +2,7 @@
 import bpy
 
 from ..operators.modifiers import FITTED, modifier_blocked
-from ..wrapping import text_lines
+from ..wrapping import property_fields, text_lines
 from .layout import SubPanel, active
 
 
@@ -19,7 +19,7 @@ class TOLVOL_PT_modifiers(SubPanel, bpy.types.Panel):
         column = layout.column()
         column.use_property_split = True
         column.use_property_decorate = False
-        column.prop(ob.tolvol.modifiers, "result")
+        property_fields(context, column, ob.tolvol.modifiers, "result")
         icons = bpy.types.Modifier.bl_rna.properties["type"].enum_items
         reasons = {modifier.name: modifier_blocked(ob, modifier) for modifier in ob.modifiers}
         for modifier in ob.modifiers:

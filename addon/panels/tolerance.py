@@ -54,7 +54,8 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
         right(layout, _estimated(context))
         layout.prop(settings, "keep")
         row = layout.row(align=True)
-        row.operator("tolvol.set_reference", text="Replace Reference..." if settings.snapshot else "Set Reference")
+        replace = "Replace..." if narrow else "Replace Reference..."
+        row.operator("tolvol.set_reference", text=replace if settings.snapshot else "Set Reference")
         if settings.snapshot:
             row.operator("tolvol.clear_reference", text="", icon="X")
         _status(context, layout, ob)

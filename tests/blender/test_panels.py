@@ -8,8 +8,10 @@ import pytest
 
 from addon import native, panels, preferences, wrapping
 from addon.job.progress_text import Told, stopping
+from addon.mesh.mesh_io import triangle_count
 from addon.panels import notes, progress
 from addon.panels.layout import AMBER, GHOST, GREEN, GREY, RED
+from addon.units import length
 from drawn import Layout, drawn, sidebar
 from scenes import sheet, torus
 
@@ -43,6 +45,67 @@ def test_too_many_lines_end_in_an_ellipsis():
         assert len(lines) == most and lines[-1].endswith("\u2026") and all(fits(line, 240) for line in lines)
         assert text.startswith(" ".join(lines).removesuffix("\u2026"))
     assert wrapping.wrapped(sidebar(2000), text, most=1) == [text]
+
+
+def names_of(panel, width):
+    """Returns {property: how its name is drawn}, and the texts of the labels."""
+    layout = drawn(panel, sidebar(width))
+    named = {arguments[1]: options for name, arguments, options in layout.shown if name == "prop"}
+    return named, [text for text, _ in layout.labels()]
+
+
+NARROW, ENOUGH = 180, 230  # widths of the sidebar: it begins with about 220
+
+
+def test_what_is_protected_has_room_in_a_narrow_sidebar():
+    torus()
+    named, labels = names_of(panels.TOLVOL_PT_protect, ENOUGH)
+    assert named["only_selected"] == {"text": "Unselected"} and named["symmetry"] == {} and "Symmetry" not in labels
+    named, labels = names_of(panels.TOLVOL_PT_protect, NARROW)
+    assert named["only_selected"] == {"text": "Unselected Faces"} and "Symmetry" in labels
+    assert named["symmetry"] == {"expand": True}  # Without names its buttons would be empty.
+
+
+@pytest.mark.parametrize(
+    ("panel", "name", "title"),
+    [
+        (panels.TOLVOL_PT_smooth, "method", "Method"),
+        (panels.TOLVOL_PT_modifiers, "result", "Result"),
+        (panels.TOLVOL_PT_show_deviation, "deviation_palette", "Colours"),
+    ],
+)
+def test_the_choices_of_a_menu_have_room_in_a_narrow_sidebar(panel, name, title):
+    ob = torus()
+    ob.modifiers.new("SMOOTH", "SMOOTH")
+    for width, above in ((ENOUGH, False), (NARROW, True)):
+        named, labels = names_of(panel, width)
+        assert named[name] == ({"text": ""} if above else {}) and (title in labels) == above
+
+
+def test_buttons_have_room_in_a_narrow_sidebar():
+    with_reference(torus())
+    for width, text in ((ENOUGH, "Replace Reference..."), (NARROW, "Replace...")):
+        panel = panels.TOLVOL_PT_tolerance
+        layout = drawn(panel, sidebar(width), _other_form=panel._other_form)
+        assert layout.buttons["tolvol.set_reference"] == text
+
+
+def test_a_list_of_verdicts_has_room_in_a_narrow_sidebar():
+    other = torus("other")
+    with_reference(torus())
+    other.select_set(True)
+    for width, word in ((ENOUGH, "NOT CHECKED"), (NARROW, "\u2013")):
+        assert [text for text, _ in drawn(panels.TOLVOL_PT_objects, sidebar(width)).labels()][1] == word
+
+
+def test_the_levels_have_room_in_a_narrow_sidebar():
+    ob = torus()
+    assert bpy.ops.tolvol.make_lods() == {"FINISHED"}
+    wide, narrow = (names_of(panels.TOLVOL_PT_lod, width)[1] for width in (ENOUGH, NARROW))
+    triangles = [f"{triangle_count(level.data):,}" for level in (ob, *ob.tolvol.lods.objects)]
+    deviations = [length(bpy.context, level["geometricError"]) for level in ob.tolvol.lods.objects]
+    assert wide == [f"{triangles[0]}  \u2013", *map("  ".join, zip(triangles[1:], deviations))]
+    assert narrow == [triangles[0], *(text for pair in zip(triangles[1:], deviations) for text in pair)]
 
 
 # A job under way -----------------------------------------------------------------------------------------------------
@@ -210,7 +273,11 @@ def why_not_checked():
 
 def test_not_checked_says_what_is_in_the_way_of_check():
     ob = torus()
+    # The first operation sets the reference, too.
+    assert why_not_checked() == "Press Decimate, or set the reference first"
+    twin = ob.copy()
     assert why_not_checked() == "Set the reference first"
+    bpy.data.objects.remove(twin)
     with_reference(ob)
     ob.data.vertices[0].co.x += 0.001
     ob.data.update()
