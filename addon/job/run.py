@@ -10,6 +10,7 @@ from .. import native, status_bar
 from ..background import Job
 from ..redraw import redraw_sidebars
 from ..shared.errors import Refused
+from ..wrapping import popup_text
 from . import interruptions, progress_text
 from .claim import Claim
 
@@ -107,7 +108,7 @@ class Run:
             self.voice.report({"INFO"}, f"{self.label} was cancelled. {left}")
             return {"CANCELLED"}
         except (Refused, native.module.TolvolError) as error:
-            self.voice.report({"ERROR"}, native.said(error))
+            self.voice.report({"ERROR"}, popup_text(native.said(error)))
             return {"CANCELLED"}
 
     def go_on(self, seconds):

@@ -383,3 +383,18 @@ def test_a_length_typed_in_millimetres():
     screenshot("17 typed")
     assert tolerances.tolerance_length(ob.tolvol, 1) == 0.5, ob.tolvol.tolerance_length
     units.scale_length, units.length_unit = 1.0, "METERS"
+
+
+def test_the_lines_of_an_error_have_room_in_blenders_popup():
+    yield from reset(scenes.moved_up)
+    ob = bpy.context.object
+    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.05
+    said = ""
+    try:
+        bpy.ops.tolvol.decimate()
+    except RuntimeError as error:
+        said = str(error).removeprefix("Error: ")
+    lines = said.splitlines()
+    assert len(lines) == 2 and all(len(line) <= 101 for line in lines)
+    # The status bar shows both as one.
+    assert "Select Outside shows these faces" in "".join(lines)
