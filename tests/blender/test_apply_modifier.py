@@ -8,6 +8,7 @@ from mathutils import Matrix
 
 from addon import native
 from addon.mesh.mesh_io import column
+from addon.operators.motion import BENT
 from addon.proof import kept_warnings, verdict
 from addon.reference import snapshots
 from addon.shared.surface import to_world
@@ -63,6 +64,14 @@ def test_what_holds_t_junctions_together_stays_and_the_panel_says_so():
     assert not moved[between].any() and moved[~between].any()
     warnings, _ = kept_warnings.of(ob)
     assert warnings == [f"{between.sum()} vertices hold T-junctions together and cannot move"]
+
+
+def test_says_of_a_mesh_that_is_its_own_reference_only_that_its_bent_quads_stay():
+    ob = modified("SMOOTH", settings={"iterations": 5})
+    ob.tolvol.tolerance_percent = 0.2
+    assert bpy.ops.tolvol.apply_modifier() == {"FINISHED"}
+    assert verdict.word(ob) == verdict.PASS
+    assert kept_warnings.of(ob)[0] == [BENT]
 
 
 def test_acts_on_the_base_mesh_without_other_modifiers_keys_and_animation():
