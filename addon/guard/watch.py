@@ -212,7 +212,8 @@ class Watch(Preparing):
             # corners of such a quad where they are.
             kept = len(np.unique(polygons[guard.outside]))
             if kept:
-                remark = f"{kept:,} concave faces stay where they are"
+                one = "1 concave face stays where it is"
+                remark = one if kept == 1 else f"{kept:,} concave faces stay where they are"
             elif guard.uncovered:
                 remark = f"{guard.uncovered:,} faces of the reference are beyond the tolerance: what is nearest stays"
             else:
@@ -306,7 +307,7 @@ class Watch(Preparing):
     def said(self):
         """Returns the message about the last stroke, or None."""
         if self._held.any():
-            return f"Held back {self.held_back:,} vertices"
+            return "Held back 1 vertex" if self.held_back == 1 else f"Held back {self.held_back:,} vertices"
         return self.remark
 
 

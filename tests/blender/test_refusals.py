@@ -103,7 +103,7 @@ def test_what_the_module_refuses_is_said_in_the_panels_words():
     for operator in (bpy.ops.tolvol.decimate, bpy.ops.tolvol.smooth):
         with pytest.raises(
             RuntimeError,
-            match=r"faces are .* take a larger tolerance or set the reference anew\. Select Outside.* once the "
+            match=r"faces are .* take a larger tolerance or replace the reference\. Select Outside.* once the "
             "reference is set",
         ) as said:
             operator()
