@@ -261,8 +261,37 @@ def loose_edges(mesh):
     return column(mesh.edges, "vertices", 2, np.int32)[loose]
 
 
+# UVs of corners at one vertex that differ by less than this are of one island: rounding makes them differ, as in Blender's
+# own grid. It holds for UVs up to 1, and grows with larger ones.
+_SAME_UV = 2.0**-20
+
+
 def corner_uvs(mesh):
-    """Returns (corners, 2 * layers) float32: the values of all UV maps. Returns None if there are none."""
+    """Returns (corners, 2 * layers) float32: the values of all UV maps, equal at the corners of a vertex that differ only by
+    rounding. They tell islands apart, and are not for writing. Returns None if there are no UV maps."""
     if not mesh.uv_layers:
         return None
-    return np.hstack([column(layer.data, "uv", 2) for layer in mesh.uv_layers])
+    uvs = np.hstack([column(layer.data, "uv", 2) for layer in mesh.uv_layers])
+    vertices = column(mesh.loops, "vertex_index", 1, np.int32)
+    first = np.zeros(len(mesh.vertices), np.int64)
+    first[vertices[::-1]] = np.arange(len(vertices))[::-1]
+    several = np.zeros(len(mesh.vertices), bool)
+    several[vertices[(uvs != uvs[first[vertices]]).any(1)]] = True
+    corners = np.flatnonzero(several[vertices])
+    if len(corners):
+        for coordinate in range(uvs.shape[1]):
+            uvs[corners, coordinate] = _joined(vertices[corners], uvs[corners, coordinate])
+    return uvs
+
+
+def _joined(groups, values):
+    """Returns the values, those of a group made equal that differ by less than _SAME_UV, also by way of others."""
+    order = np.lexsort((values, groups))
+    groups, values = groups[order], values[order]
+    begins = np.ones(len(order), bool)
+    with np.errstate(invalid="ignore"):  # A damaged file may hold any number.
+        near = np.diff(values) < _SAME_UV * np.maximum(1, np.abs(values[1:]))
+    begins[1:] = (np.diff(groups) != 0) | ~near
+    joined = np.empty_like(values)
+    joined[order] = values[np.maximum.accumulate(np.where(begins, np.arange(len(order)), 0))]
+    return joined

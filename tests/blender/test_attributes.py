@@ -10,6 +10,7 @@ import pytest
 
 from addon.mesh import mesh_io
 from addon.mesh.mesh_io import column
+from addon.proof import kept_warnings
 from scenes import activate, sheet, torus
 
 KINDS = {
@@ -320,6 +321,30 @@ def test_custom_normals_lean_as_before_where_vertices_moved():
     ideal /= np.linalg.norm(ideal, axis=1, keepdims=True)
     cosine = (corner_normals(ob.data) * ideal[at]).sum(1)
     assert np.median(cosine) > 0.999 and cosine.min() > 0.7
+
+
+def test_uvs_that_differ_by_rounding_are_no_seam():
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=60, y_subdivisions=60, size=4)
+    ob = bpy.context.active_object
+    mesh = ob.data
+    uvs, vertices = column(mesh.uv_layers[0].data, "uv", 2), column(mesh.loops, "vertex_index", 1, np.int32)
+    first = uvs[np.unique(vertices, return_index=True)[1]]
+    apart = np.abs(uvs - first[vertices]).max()
+    assert 0 < apart < 1e-7
+    assert bpy.ops.tolvol.decimate() == {"FINISHED"}
+    assert len(mesh.polygons) == 2 and not kept_warnings.of(ob)[1]
+
+
+def test_uvs_that_differ_by_more_than_rounding_are_a_seam_whatever_else_the_map_holds():
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=8, y_subdivisions=8, size=4)
+    mesh = bpy.context.active_object.data
+    values = column(mesh.uv_layers[0].data, "uv", 2)
+    values[5], values[12], values[40] = np.nan, np.inf, 1e30
+    values[100:104] += 1e-5
+    mesh.uv_layers[0].data.foreach_set("uv", values.ravel())
+    told = mesh_io.corner_uvs(mesh)
+    kept = np.isfinite(values)
+    assert np.abs(told[kept] - values[kept]).max() < 1e-6 and np.array_equal(told[~kept], values[~kept], equal_nan=True)
 
 
 def test_islands_everywhere_are_named_as_what_holds_the_mesh():
