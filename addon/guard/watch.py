@@ -208,12 +208,12 @@ class Watch(Preparing):
             keep = {"two_sided": two_sided, "outside": "keep", "crossings": crossings}
             rows, polygons = faces.guarded
             guard = native.module.Guard(positions, rows, built, **keep, **options)
-            # A concave quad may be inside in its present triangulation and outside in the other one. The guard keeps the
+            # A concave or bent quad may be inside in its present triangulation and outside in the other one. The guard keeps the
             # corners of such a quad where they are.
             kept = len(np.unique(polygons[guard.outside]))
             if kept:
-                one = "1 concave face stays where it is"
-                remark = one if kept == 1 else f"{kept:,} concave faces stay where they are"
+                one = "1 bent or concave face stays where it is"
+                remark = one if kept == 1 else f"{kept:,} bent or concave faces stay where they are"
             elif guard.uncovered:
                 remark = f"{guard.uncovered:,} faces of the reference are beyond the tolerance: what is nearest stays"
             else:
