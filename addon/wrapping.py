@@ -62,7 +62,7 @@ def _shortened(line, room):
     words = line.split()
     while len(words) > 1 and _width(" ".join(words) + "\u2026") > room:
         words.pop()
-    return " ".join(words) + "\u2026"
+    return " ".join(words).rstrip(".,:;") + "\u2026"
 
 
 _BESIDE_FIELD = 0.4  # the share of the width that Blender gives to the name of a property beside its field

@@ -96,7 +96,8 @@ def _row(context, column, name, *texts):
 def _why_not_checked(ob):
     if measuring.wanted(ob):
         return measuring.failure(ob) or "Being measured"
-    if ob.tolvol.snapshot is None and not blocked.decimate_blocked(ob):
+    own = ob.tolvol.snapshot is None and ob.tolvol.reference_kind == "SELF"
+    if own and not blocked.decimate_blocked(ob):
         return "Press Decimate, or set the reference first"  # The first operation sets it, too.
     return blocked.check_blocked(ob) or "Press Check to measure it"
 

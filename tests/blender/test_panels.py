@@ -44,6 +44,8 @@ def test_too_many_lines_end_in_an_ellipsis():
         lines = wrapping.wrapped(sidebar(240), text, most=most)
         assert len(lines) == most and lines[-1].endswith("\u2026") and all(fits(line, 240) for line in lines)
         assert text.startswith(" ".join(lines).removesuffix("\u2026"))
+    ends = wrapping.wrapped(sidebar(240), "The reference is gone. Choose another one, and set it anew", most=1)
+    assert ends[0].endswith("gone\u2026")
     assert wrapping.wrapped(sidebar(2000), text, most=1) == [text]
 
 
@@ -285,6 +287,12 @@ def test_not_checked_says_what_is_in_the_way_of_check():
     assert why_not_checked() == "Press Check to measure it"
     ob.data.clear_geometry()
     assert why_not_checked() == "torus has no faces" and not bpy.ops.tolvol.check.poll()
+
+
+def test_not_checked_names_decimate_only_where_no_other_mesh_could_be_too_far():
+    other, ob = torus("other"), torus()
+    ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", other
+    assert why_not_checked() == "Set the reference first"
 
 
 def test_not_checked_asks_for_no_reference_that_cannot_be_set():
