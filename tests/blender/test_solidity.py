@@ -17,7 +17,7 @@ from addon.reference import snapshots
 from addon.shared.proof import solidity
 from addon.shared.surface import joined
 from commands import command, save
-from drawn import buttons
+from drawn import drawn, sidebar
 from scenes import activate, add_object, link, sheet, torus, torus_arrays
 
 CUBE = (
@@ -203,10 +203,10 @@ def test_select_crossing_faces():
         assert whole.mode == "OBJECT"
 
 
-def test_the_button_has_the_name_of_the_manual(monkeypatch):
+def test_the_button_has_the_name_of_the_manual():
     activate(torus())
-    monkeypatch.setattr(deviation, "_draw_verdict", lambda *_: None)  # It asks for the width of the sidebar.
-    assert buttons(deviation.TOLVOL_PT_deviation)["tolvol.select_crossing"] == "Select Crossing Faces"
+    shown = drawn(deviation.TOLVOL_PT_deviation, sidebar())
+    assert shown.buttons["tolvol.select_crossing"] == "Select Crossing Faces"
     manual = Path(__file__).resolve().parents[2] / "docs" / "manual.md"
     assert "*Select Crossing Faces*" in manual.read_text()
 
