@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "base/call.h"
+#include "topology/faces_apart.h"
 #include "topology/faces_cross.h"
 #include "topology/near_faces.h"
 
@@ -18,7 +19,9 @@ void append_pairs(std::uint32_t i, const MeshView& mesh, const NearFaces& near, 
   std::size_t seen = 0;
   near.for_each_near(own, [&](std::uint32_t j) {
     if (seen++ % 256 == 0) poll();
-    if (j > i && faces_cross(own, mesh.corners(j))) pairs.emplace_back(i, j);
+    if (j <= i) return true;
+    const Corners other = mesh.corners(j);
+    if (!surely_uncrossed(own, other) && faces_cross(own, other)) pairs.emplace_back(i, j);
     return true;
   });
   std::sort(pairs.begin() + before, pairs.end(), [](const glm::uvec2& a, const glm::uvec2& b) { return a.y < b.y; });
