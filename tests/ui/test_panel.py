@@ -21,6 +21,7 @@ from window import (
     find,
     find_property,
     finished,
+    fold_adjust,
     key,
     on_screen,
     open_tab,
@@ -31,6 +32,7 @@ from window import (
     screenshot,
     status_texts,
     still,
+    unfold_adjust,
     view,
     window_context,
     xdotool,
@@ -131,9 +133,7 @@ def test_adjust_last_operation():
     yield from finished(lambda: len(suzanne().data.polygons) < 3000)
     yield from at_rest()
     first = len(suzanne().data.polygons)
-    hud = region("HUD")
-    yield from click(*on_screen(hud, 60, hud.height - 12))  # The panel is closed at first, so only its header is there.
-    yield from finished(lambda: region("HUD").height > 200)
+    yield from unfold_adjust()
     yield from at_rest()
     hud = region("HUD")
     xdotool("mousemove", *on_screen(hud, hud.width * 2 // 3, 50))
@@ -150,8 +150,7 @@ def test_adjust_last_operation():
     # The reference is the first mesh and not the first result.
     assert len(suzanne().tolvol.snapshot.polygons) == TRIANGLES
     assert_proved(suzanne(), reference, 3)
-    xdotool("mousemove", *centre())
-    yield
+    yield from fold_adjust()
     key("ctrl+z")
     yield from at_rest()
     assert len(scenes.world_triangles(suzanne())[1]) == TRIANGLES

@@ -354,6 +354,22 @@ def scroll_down():
     yield from scroll(DOWN)
 
 
+def unfold_adjust():
+    """Unfolds the panel of the last operation, which at first is only a header in the corner of the view."""
+    yield from finished(lambda: region("HUD").height > 10)
+    hud = region("HUD")
+    yield from click(*on_screen(hud, 60, hud.height - 12))
+    yield from finished(lambda: region("HUD").height > 200)
+
+
+def fold_adjust():
+    """Folds that panel again. Blender would unfold it in later tests, too, and it would take the keys that they press."""
+    yield from click(*on_screen(region("HUD"), 60, 12))
+    yield from finished(lambda: region("HUD").height < 100)
+    xdotool("mousemove", *centre())
+    yield
+
+
 def end_operators():
     """Ends what a failed test has left at work, and leaves its mode.
 
