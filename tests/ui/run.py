@@ -29,6 +29,14 @@ from addon import native  # noqa: E402
 window.draw_finely(False)
 
 
+def in_its_window(test):
+    """Runs a test in a window as wide as its file asks for by WIDTH, otherwise in a narrow one: see window.resize()."""
+    width = getattr(sys.modules[test.__module__], "WIDTH", window.NARROW)
+    if window.view()[0].width != width:
+        yield from window.resize(width, window.view()[0].height)
+    yield from test()
+
+
 class Run:
     def __init__(self, names):
         modules = [importlib.import_module(path.stem) for path in sorted(FOLDER.glob("test_*.py"))]
@@ -54,7 +62,7 @@ class Run:
                 if not self.waiting:
                     self.end()
                 print(f"{self.waiting[0].__name__} ...", flush=True)
-                self.current = self.waiting.pop(0)()
+                self.current = in_its_window(self.waiting.pop(0))
             pause = next(self.handling, None)
             if pause is None:
                 pause = next(self.current)

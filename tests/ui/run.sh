@@ -27,7 +27,7 @@ done
 
 code=0
 DISPLAY=":$(cat "$out/display")" LIBGL_ALWAYS_SOFTWARE=1 timeout 3000 \
-  blender --factory-startup --window-geometry 0 278 1060 746 --python-exit-code 5 --python tests/ui/run.py -- "$@" \
+  blender --factory-startup --window-geometry 0 278 720 746 --python-exit-code 5 --python tests/ui/run.py -- "$@" \
   >"$out/blender.log" 2>&1 || code=$?
 # An exception in the draw function of a panel appears only in Blender's output.
 if grep -q Traceback "$out/blender.log"; then

@@ -16,6 +16,7 @@ from panels_open import alone
 from test_job import status_bar_pixels
 from test_warnings import islands
 from window import (
+    WIDE,
     at_rest,
     finished,
     on_screen,
@@ -29,6 +30,8 @@ from window import (
     window_context,
     xdotool,
 )
+
+WIDTH = WIDE  # The view has room for the boxes of places and labels beside the mesh.
 
 
 def ball():

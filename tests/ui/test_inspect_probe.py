@@ -15,6 +15,7 @@ from addon.proof import labels, probing
 from addon.proof import places as worst_places
 from test_layout import dark, drag_sidebar, light
 from window import (
+    WIDE,
     at_rest,
     click,
     finished,
@@ -30,6 +31,8 @@ from window import (
     window_context,
     xdotool,
 )
+
+WIDTH = WIDE  # The view has room for labels beside the mesh.
 
 
 def ball():

@@ -11,6 +11,7 @@ from panels_open import unfolded
 from test_layout import dark, drag_sidebar, light
 from test_show_deviation import striped, surface
 from window import (
+    WIDE,
     at_rest,
     click_property,
     finished,
@@ -29,6 +30,8 @@ from window import (
     window_context,
     xdotool,
 )
+
+WIDTH = WIDE  # The legend is dragged, and its colours are counted in a wide view.
 
 
 def ramp():

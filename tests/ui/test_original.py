@@ -8,6 +8,7 @@ import scenes
 from addon.mesh import mesh_io
 from addon.operators import decimate, original
 from window import (
+    WIDE,
     at_rest,
     centre,
     finished,
@@ -26,6 +27,8 @@ from window import (
     window_context,
     xdotool,
 )
+
+WIDTH = WIDE  # A large part of the view is compared.
 
 
 def torus():

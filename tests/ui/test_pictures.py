@@ -20,6 +20,7 @@ from addon.reference import measurements
 from panels_open import alone
 from test_show_deviation import counted, sides, solid_monkey, stroke, surface, the_object, to_mode
 from window import (
+    WIDE,
     draw_finely,
     finished,
     on_screen,
@@ -35,6 +36,8 @@ from window import (
     window_context,
     xdotool,
 )
+
+WIDTH = WIDE  # The view of the pictures is as wide as that.
 
 _FOREHEAD = (0.43, 0.255), (0.54, 0.235)  # two places, as shares of the view's width and height
 _MIDDLE = (0.46, 0.25), (0.50, 0.243)

@@ -11,6 +11,7 @@ from addon import guard, native, overlay
 from addon.proof import verdict
 from test_panel import monkey, suzanne
 from window import (
+    WIDE,
     at_rest,
     centre,
     click,
@@ -30,6 +31,8 @@ from window import (
     window_context,
     xdotool,
 )
+
+WIDTH = WIDE  # The tests count the pixels of a large view.
 
 
 def ball():

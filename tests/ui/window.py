@@ -17,8 +17,36 @@ from addon.job import progress_text
 PICTURES = Path(__file__).resolve().parents[2] / os.environ.get("TOLVOL_UI_OUT", "build/ui")
 
 
+_COMMANDS = {
+    "mousemove",
+    "mousemove_relative",
+    "mousedown",
+    "mouseup",
+    "click",
+    "key",
+    "keydown",
+    "keyup",
+    "type",
+    "windowsize",
+}
+_sending = []  # the xdotool that sends all events
+
+
 def xdotool(*arguments):
-    subprocess.run(["xdotool", *map(str, arguments)], check=True)
+    """Gives commands to xdotool, and returns once the server has their events.
+
+    One xdotool takes all commands from its input: to start another one takes many times as long as to send an event.
+    """
+    if not _sending:
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        _sending.append(subprocess.Popen(["xdotool", "-"], text=True, **pipes))
+    words = [f'"{word}"' if " " in word else word for word in map(str, arguments)]
+    # It cuts long lines, so that each command has one of its own.
+    lines = "".join(f"\n{word}" if word in _COMMANDS else f" {word}" for word in words)
+    # The answer to a question comes after the server has taken all that was sent before.
+    _sending[0].stdin.write(f"{lines.lstrip()}\ngetmouselocation\n")
+    _sending[0].stdin.flush()
+    assert _sending[0].stdout.readline(), f"xdotool has ended at {arguments}"
 
 
 def click(x, y):
@@ -400,8 +428,11 @@ def close_other_areas():
     yield from finished(lambda: hasattr(bpy.context, "object"))
 
 
+NARROW, WIDE = 720, 1060  # pixels: the first leaves room for the sidebar and for a view as wide
+
+
 def resize(width, height):
-    """Gives the window another size."""
+    """Gives the window another size. To draw it in software takes as long as it has pixels."""
     window = view()[0]
     shell = subprocess.run(["xdotool", "search", "--class", "blender"], check=True, capture_output=True, text=True)
     xdotool("windowsize", shell.stdout.split()[-1], width, height)
