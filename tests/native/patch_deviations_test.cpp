@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "patches.h"
 
@@ -79,14 +80,61 @@ TEST(PatchDeviations, WhatWasBeyondBeforeMayStay) {
   std::uint32_t face = 0;
   const dvec3 point = f.plate.mesh->position(kMiddle) + dvec3(0, 0, 0.999 * f.unit);
   f.deviations.deviation(point, face);
-  const SurfaceSample as_before{point, 1, 0.9995};
+  const dvec3 anywhere(1.0 / 3);
+  const SurfaceSample as_before{point, 1, 0.9995, anywhere};
   f.deviations.add({&as_before, 1}, face);
   f.deviations.renew();
   EXPECT_TRUE(f.deviations.enough());
-  const SurfaceSample worse{point, 1, 0.9};
+  const SurfaceSample worse{point, 1, 0.9, anywhere};
   f.deviations.add({&worse, 1}, face);
   f.deviations.renew();
   EXPECT_FALSE(f.deviations.enough());
+}
+
+TEST(PatchDeviations, OnlyWhatDeviatesIsSearched) {
+  Plate f(0);
+  const auto searches_of = [&](const auto& call) {
+    const std::size_t before = f.deviations.work();
+    call();
+    return f.deviations.work() - before;
+  };
+  const std::size_t points = f.deviations.terms().size();
+  const auto move = [&](double by) {
+    for (Patch::Vertex& v : f.patch.vertices()) {
+      if (v.free) v.position.z += by * f.unit;
+    }
+  };
+  EXPECT_EQ(searches_of([&] { f.deviations.renew(); }), 0u) << "nothing has moved";
+  move(0.8);
+  EXPECT_EQ(searches_of([&] { f.deviations.renew(); }), 0u);
+  move(0.4);
+  const std::size_t searched = searches_of([&] { f.deviations.renew(); });
+  EXPECT_GT(searched, points / 10);
+  EXPECT_LT(searched, points) << "near the rim the deviations are less than 1";
+  move(-0.05);
+  const std::size_t of_low_power = searches_of([&] { f.deviations.renew_if_lower(false); });
+  f.deviations.set_power(24);
+  move(-0.01);
+  EXPECT_LT(searches_of([&] { f.deviations.renew_if_lower(false); }), of_low_power);
+}
+
+TEST(PatchDeviations, AreAtLeastTheTrueOnesAndEqualThemWhereTheyAreLarge) {
+  Plate f(0.5);
+  std::minstd_rand random(1);
+  std::uniform_real_distribution<double> shift(-0.3, 0.3);
+  for (int i = 0; i < 20; ++i) {
+    for (Patch::Vertex& v : f.patch.vertices()) {
+      if (v.free) v.position += f.unit * dvec3(shift(random), shift(random), 2 * shift(random));
+    }
+    f.deviations.renew();
+    for (std::size_t t = 0; t < f.deviations.reference_count(); ++t) {
+      const PatchDeviations::Term& term = f.deviations.terms()[t];
+      std::uint32_t face = term.face;
+      const double found = std::sqrt(term.square), exact = f.deviations.deviation(term.target, face);
+      EXPECT_GE(found, exact - 1e-9);
+      if (found > 1) EXPECT_NEAR(found, exact, 1e-9);
+    }
+  }
 }
 
 }  // namespace

@@ -100,12 +100,10 @@ struct Ridge {
     gather(*mesh.mesh, change, patch);
     for (Patch::Vertex& v : patch.vertices()) v.free = false;
     deviations.start(patch);
-    std::vector<SurfaceSample> samples;
     for (double t = -0.1; t <= 0.1; t += 0.01) {
       const glm::dvec3 middle = mesh.reference.vertices[kMiddle];
-      samples.push_back({mesh.space->frame(glm::dvec3(middle.x + t, middle.y - t, 0)), 1, 0});
+      deviations.add_reference_point(mesh.space->frame(glm::dvec3(middle.x + t, middle.y - t, 0)), 1, 0);
     }
-    deviations.add(samples, 0);
     deviations.renew();
   }
   static TriangleMesh surface(bool across) {

@@ -85,7 +85,7 @@ TEST(Refinement, KeepsTheOneDirectionThatIsAskedFor) {
 }
 
 TEST(Refinement, SubsetKeepsPositionsBitForBit) {
-  const Case c = torus();
+  const Case c{shapes::torus(36, 0.02), glm::dmat4(1), Storage::float32, kPercent};
   Options options = thorough();
   options.placement = Options::Placement::subset;
   const DecimationResult r = run(c, options);

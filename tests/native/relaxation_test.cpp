@@ -42,8 +42,7 @@ TEST(Relaxation, HoldsPointsThatAreAdded) {
   std::uint32_t face = 0;
   const dvec3 point = f.plate.mesh->position(kMiddle) + dvec3(0, 0, 1.4 * f.unit);
   EXPECT_NEAR(f.deviations.deviation(point, face), 1.4, 1e-6);
-  const SurfaceSample sample{point, 1, 0};
-  f.deviations.add({&sample, 1}, face);
+  f.deviations.add_reference_point(point, 1, face);
   f.deviations.renew();
   EXPECT_NEAR(f.deviations.state().largest, 1.4, 1e-6);
   relaxation.lower_largest(f.deviations, 12);
@@ -59,8 +58,7 @@ TEST(Relaxation, GivesUpOnPointsThatContradictEachOther) {
   const dvec3 middle = f.plate.mesh->position(kMiddle);
   f.deviations.deviation(middle, face);
   for (const double side : {1.4, -1.4}) {
-    const SurfaceSample sample{middle + dvec3(0, 0, side * f.unit), 1, 0};
-    f.deviations.add({&sample, 1}, face);
+    f.deviations.add_reference_point(middle + dvec3(0, 0, side * f.unit), 1, face);
   }
   f.deviations.renew();
   EXPECT_EQ(polls_of([&] { relaxation.try_lower_largest(f.deviations, 10); }), 1u) << "before the first step";

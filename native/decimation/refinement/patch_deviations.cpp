@@ -3,15 +3,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace tolvol {
 namespace {
 
+constexpr double kUnknown = std::numeric_limits<double>::infinity();
 /// The weights of the points of a vertex, an edge and a face. The points of the reference near a face weigh 1 together.
 constexpr double kVertexWeight = 0.05, kEdgeWeight = 0.03, kFaceWeight = 0.05;
 /// A search that looks around looks at all faces if a deviation is beyond this share of the tolerance.
 constexpr double kLookEverywhereAbove = 0.98;
+/// A search starts where the point that was nearest has a larger squared deviation: it is beyond the tolerance.
+constexpr double kSearchAbove = 1;
+/// A step of a relaxation searches where the energy is more than this share of that of the largest deviation.
+constexpr double kFollowed = 3e-4;
 /// The search for the nearest face crosses at most this many edges or corners.
 constexpr int kMostCrossings = 16;
 /// A point of a face that finds no triangle of the reference counts with this squared deviation.
@@ -93,20 +99,36 @@ double PatchDeviations::scale_of(std::uint32_t face) const {
 }
 
 void PatchDeviations::add(std::span<const SurfaceSample> samples, std::uint32_t face) {
-  // Terms of the points of the reference stand first.
-  terms_.resize(points_.size());
+  const bool is_as_it_was = !patch_->faces()[face].changed;
   for (const SurfaceSample& s : samples) {
-    points_.push_back(s);
-    terms_.push_back({face, {}, {}, 0});
+    add_reference_point(s, face);
+    if (is_as_it_was) terms_.back().weights = s.weights, terms_.back().square = s.deviation * s.deviation;
   }
 }
 
+void PatchDeviations::add_reference_point(const glm::dvec3& point, double weight, std::uint32_t face) {
+  add_reference_point(SurfaceSample{point, weight, 0, {}}, face);
+}
+
+void PatchDeviations::add_reference_point(const SurfaceSample& sample, std::uint32_t face) {
+  // Terms of the points of the reference stand first.
+  terms_.resize(points_.size());
+  points_.push_back(sample);
+  terms_.push_back({face, {}, sample.point, {}, kUnknown});
+}
+
 void PatchDeviations::add_face_point(std::uint32_t face, const glm::dvec3& weights, double weight) {
-  added_points_.push_back(point_of(face, weights, weight));
+  add_point(point_of(face, weights, weight));
 }
 
 void PatchDeviations::add_open_point(std::uint32_t face, const glm::dvec3& weights, double weight) {
-  added_points_.push_back(open_point_of(face, weights, weight));
+  add_point(open_point_of(face, weights, weight));
+}
+
+void PatchDeviations::add_point(const FacePoint& point) {
+  // The term of the new point stands before those of points that are held in half-spaces.
+  terms_.resize(std::min(terms_.size(), points_.size() + own_points_.size() + added_points_.size()));
+  added_points_.push_back(point);
 }
 
 PatchDeviations::FacePoint PatchDeviations::point_of(std::uint32_t face, const glm::dvec3& weights,
@@ -130,13 +152,12 @@ void PatchDeviations::add_separation(std::uint32_t face, const Separation& separ
 }
 
 void PatchDeviations::renew() {
-  evaluate(true, tried_);
-  std::swap(terms_, tried_);
-  now_ = sum(terms_);
+  evaluate(true, kSearchAbove, tried_);
+  keep_tried();
 }
 
 bool PatchDeviations::renew_if_lower(bool look_around) {
-  evaluate(look_around, tried_);
+  evaluate(look_around, square_at(kFollowed), tried_);
   const State tried = sum(tried_);
   if (!(tried.energy < now_.energy)) return false;
   std::swap(terms_, tried_);
@@ -145,8 +166,10 @@ bool PatchDeviations::renew_if_lower(bool look_around) {
 }
 
 void PatchDeviations::renew_after_flips() {
+  terms_.resize(points_.size());
   take_points_of_faces();
-  renew();
+  evaluate(false, square_at(kFollowed), tried_);
+  keep_tried();
 }
 
 void PatchDeviations::set_power(int power) {
@@ -161,7 +184,7 @@ PatchDeviations::Term PatchDeviations::at(const glm::dvec3& point, std::uint32_t
                    &c = vertices[corners[2]].position;
   const glm::dvec3 weights = weights_of_nearest(point, a, b, c);
   const glm::dvec3 residual = point - (weights.x * a + weights.y * b + weights.z * c);
-  return {face, weights, residual, glm::dot(residual, residual) * unit2_};
+  return {face, weights, point, residual, glm::dot(residual, residual) * unit2_};
 }
 
 /// Goes on to the faces beyond the edge or around the corner to which the nearest point is clamped.
@@ -213,9 +236,9 @@ glm::dvec3 PatchDeviations::place(const FacePoint& p) const {
 PatchDeviations::Term PatchDeviations::toward_reference(const FacePoint& p) const {
   const glm::dvec3 x = place(p);
   const auto q = p.ruled_by == Patch::kNone ? bounds_->forward().nearby_point(x) : nearest_admitted(p, x);
-  if (!q) return {Patch::kNone, p.weights, glm::dvec3(0), kFarSquare};
+  if (!q) return {Patch::kNone, p.weights, x, glm::dvec3(0), kFarSquare};
   const glm::dvec3 residual = *q - x;
-  return {Patch::kNone, p.weights, residual, glm::dot(residual, residual) * unit2_ * p.scale};
+  return {Patch::kNone, p.weights, *q, residual, glm::dot(residual, residual) * unit2_ * p.scale};
 }
 
 /// A face without a sure normal is steered as if it were free of the rule.
@@ -230,21 +253,54 @@ std::optional<glm::dvec3> PatchDeviations::nearest_admitted(const FacePoint& p, 
 }
 
 PatchDeviations::Term PatchDeviations::into_half_space(const HeldPoint& p) const {
-  const double missing = std::max(0.0, p.offset - glm::dot(p.normal, place(p.point)));
-  return {Patch::kNone, p.point.weights, missing * p.normal, missing * missing * unit2_};
+  const glm::dvec3 x = place(p.point);
+  const double missing = std::max(0.0, p.offset - glm::dot(p.normal, x));
+  return {Patch::kNone, p.point.weights, x + missing * p.normal, missing * p.normal, missing * missing * unit2_};
 }
 
-/// Finds the terms of all points, as the patch is now. The search for a nearest face begins at that of terms_.
-void PatchDeviations::evaluate(bool look_around, std::vector<Term>& terms) {
+/// The term as the patch is now, if the point that was nearest still is the nearest one. Otherwise the true deviation
+/// is less. Returns nullopt if the square was or is more than `most_square`.
+std::optional<PatchDeviations::Term> PatchDeviations::followed(std::size_t term, double most_square) const {
+  if (term >= terms_.size() || terms_[term].square > most_square) return std::nullopt;
+  Term now = terms_[term];
+  const auto vertices = patch_->vertices();
+  const auto& c = corners(term);
+  now.residual = now.target - (now.weights.x * vertices[c[0]].position + now.weights.y * vertices[c[1]].position +
+                               now.weights.z * vertices[c[2]].position);
+  const double scale = term < points_.size() ? 1 : face_point(term - points_.size()).scale;
+  now.square = glm::dot(now.residual, now.residual) * unit2_ * scale;
+  if (now.square > most_square) return std::nullopt;
+  return now;
+}
+
+/// Finds the terms of all points, as the patch is now. Those up to a squared deviation follow the points that were
+/// nearest. The search for a nearest face begins at that of terms_.
+void PatchDeviations::evaluate(bool look_around, double followed_up_to, std::vector<Term>& terms) {
   terms.clear();
   for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (const auto term = followed(i, followed_up_to)) {
+      terms.push_back(*term);
+      continue;
+    }
     terms.push_back(nearest(points_[i].point, terms_[i].face, look_around));
+    ++work_;
   }
   for (const auto* all : {&own_points_, &added_points_}) {
-    for (const FacePoint& p : *all) terms.push_back(toward_reference(p));
+    for (const FacePoint& p : *all) {
+      if (const auto term = followed(terms.size(), followed_up_to)) {
+        terms.push_back(*term);
+        continue;
+      }
+      terms.push_back(toward_reference(p));
+      ++work_;
+    }
   }
   for (const HeldPoint& p : separations_) terms.push_back(into_half_space(p));
-  work_ += terms.size();
+}
+
+void PatchDeviations::keep_tried() {
+  std::swap(terms_, tried_);
+  now_ = sum(terms_);
 }
 
 PatchDeviations::State PatchDeviations::sum(const std::vector<Term>& terms) const {

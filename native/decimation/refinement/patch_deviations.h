@@ -3,6 +3,8 @@
 /// patch, and at points of these faces, which are near the reference. It steers a Relaxation and proves nothing.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <optional>
@@ -27,8 +29,11 @@ class PatchDeviations {
   void start(Patch& patch);
   Patch& patch() const { return *patch_; }
 
-  /// Adds points of the reference, which are nearest to `face` or to faces near by.
+  /// Adds the samples of a face of the mesh. They are nearest to `face`, which it is or which takes its place, or to
+  /// faces near by.
   void add(std::span<const SurfaceSample> samples, std::uint32_t face);
+  /// Adds a point of the reference, which is nearest to `face` or to a face near by.
+  void add_reference_point(const glm::dvec3& point, double weight, std::uint32_t face);
   /// Adds a point of a face, by its barycentric coordinates, to be held near the reference.
   void add_face_point(std::uint32_t face, const glm::dvec3& weights, double weight);
   /// The same for a point that has no proof: it is held near those triangles of the reference that the rule of facing
@@ -42,15 +47,18 @@ class PatchDeviations {
   bool has_separations() const { return !separations_.empty(); }
 
   /// Finds the deviations of all points, as the patch is now. It is needed after points were added or positions were
-  /// changed.
+  /// changed. It searches only for points beyond the tolerance. For the others the point that was nearest counts as
+  /// nearest still, so that their deviation may be less than what is found.
   void renew();
-  /// The same, and keeps what it finds if the energy is less than before. Returns whether it is. Unless `look_around`,
-  /// the search for the nearest face ends where no face beside it is nearer.
+  /// The same, and keeps what it finds if the energy is less than before. Returns whether it is. It searches for all
+  /// points whose energy is not negligible beside that of the largest deviation. Unless `look_around`, the search for
+  /// the nearest face ends where no face beside it is nearer.
   bool renew_if_lower(bool look_around);
-  /// The same as renew() after flips, which change the edges and faces that have points.
+  /// The same without looking around after flips, which change the edges and faces that have points. It keeps what it
+  /// finds in any case.
   void renew_after_flips();
 
-  /// The number of deviations that were found since start(). They take most of the time of a relaxation.
+  /// The number of searches for a nearest point since start(). They take most of the time of a relaxation.
   std::size_t work() const { return work_; }
 
   /// The energy is the sum of the weighted deviations to this power, which is even: kPower from the start on.
@@ -83,8 +91,10 @@ class PatchDeviations {
   struct Term {
     std::uint32_t face;   ///< The face that is nearest to a point of the reference.
     glm::dvec3 weights;   ///< The barycentric coordinates of the point of the face.
+    glm::dvec3 target;    ///< The other point.
     glm::dvec3 residual;  ///< From the point of the face to the other one.
-    double square;        ///< The squared deviation, over the tolerance that the face may use.
+    double square;        ///< The squared deviation, over the tolerance that the face may use; infinite until it is
+                          ///< found first.
   };
   /// One term for each point. Those of the reference come first.
   std::span<const Term> terms() const { return terms_; }
@@ -103,6 +113,13 @@ class PatchDeviations {
   /// The energy that a term has, or would have with another square.
   double energy(std::size_t term) const { return energy(term, terms_[term].square); }
   double energy(std::size_t term, double square) const { return weight(term) * power_of(square, power_ / 2); }
+
+  /// The squared deviation at which the energy is this share of that of the largest deviation, or of a deviation of one
+  /// tolerance if that is less.
+  double square_at(double share) const {
+    const double deviation = std::min(1.0, now_.largest) * std::pow(share, 1.0 / power_);
+    return deviation * deviation;
+  }
 
   /// The squared deviation of a point of the reference from a face that would have these corners.
   double square_from(std::size_t point, const std::uint32_t (&corners)[3]) const;
@@ -131,6 +148,8 @@ class PatchDeviations {
     }
     return result;
   }
+  void add_reference_point(const SurfaceSample& sample, std::uint32_t face);
+  void add_point(const FacePoint& point);
   void take_points_of_faces();
   double scale_of(std::uint32_t face) const;
   FacePoint point_of(std::uint32_t face, const glm::dvec3& weights, double weight) const;
@@ -142,8 +161,10 @@ class PatchDeviations {
   Term toward_reference(const FacePoint& p) const;
   std::optional<glm::dvec3> nearest_admitted(const FacePoint& p, const glm::dvec3& x) const;
   Term into_half_space(const HeldPoint& p) const;
-  void evaluate(bool look_around, std::vector<Term>& terms);
+  std::optional<Term> followed(std::size_t term, double most_square) const;
+  void evaluate(bool look_around, double followed_up_to, std::vector<Term>& terms);
   State sum(const std::vector<Term>& terms) const;
+  void keep_tried();
   const FacePoint& face_point(std::size_t i) const {
     if (i < own_points_.size()) return own_points_[i];
     i -= own_points_.size();

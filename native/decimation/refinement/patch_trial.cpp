@@ -214,8 +214,7 @@ bool PatchTrial::pieces_hold() {
   });
   for (std::size_t i = 0; i < named.size(); ++i) {
     if (i >= kHeld && named[i - kHeld].element == named[i].element) continue;
-    const SurfaceSample sample{named[i].point, kHeldWeight, 0};
-    deviations_.add({&sample, 1}, named[i].element);
+    deviations_.add_reference_point(named[i].point, kHeldWeight, named[i].element);
   }
   learnt_ = true;
   return false;

@@ -33,7 +33,7 @@ constexpr struct {
 /// what they remove comes early, and of a small part with straight edges they would try the same edges for minutes.
 constexpr std::size_t kStartsWork = 50'000'000;
 /// An edge is not tried if the deviation with its vertex alone moved is beyond so many tolerances.
-constexpr double kMostLargest = 1.7;
+constexpr double kMostLargest = 2;
 /// The number of steps that are tried at once, for each thread. More would often be in vain, because one before them
 /// succeeds near by.
 constexpr std::size_t kAhead = 2;

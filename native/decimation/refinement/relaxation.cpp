@@ -45,6 +45,8 @@ constexpr double kTurnCosine = 0.3, kEdgeCosine = -0.8;
 constexpr int kMostHalvings = 4;
 /// Edges are flipped before one step in kFlipEvery.
 constexpr int kFlipEvery = 4;
+/// A step leaves out the points whose energy is less than this share of that of the largest deviation.
+constexpr double kLeftOut = 1e-4;
 /// One step in kLookAroundEvery looks around for nearer faces.
 constexpr int kLookAroundEvery = 3;
 
@@ -177,8 +179,10 @@ bool Relaxation::find_turned(const Patch& patch) {
 /// Sums up the gradient and the matrix, in units of the tolerance.
 void Relaxation::assemble(const PatchDeviations& deviations) {
   system_.start(free_.size());
+  const double least = deviations.square_at(kLeftOut);
   for (std::size_t i = 0; i < deviations.terms().size(); ++i) {
     const PatchDeviations::Term& t = deviations.terms()[i];
+    if (t.square < least) continue;
     const double force = deviations.force(i), length2 = glm::dot(t.residual, t.residual);
     if (!(force > 0) || !(length2 > 0)) continue;
     const double stiffness = force * (deviations.power() - 1) / length2;

@@ -21,7 +21,8 @@ constexpr std::size_t kLeastSamples = 5;
 
 struct Measured {
   glm::dvec3 point;
-  double square;  ///< of its distance from the face
+  double square;       ///< of its distance from the face
+  glm::dvec3 weights;  ///< of the point of the face that is nearest to it
 };
 
 /// Leaves about kSamples of the points: in each cell of a grid over an area the one that is farthest from the face.
@@ -75,13 +76,16 @@ void SurfaceSamples::renew(const BoundedMesh& mesh, std::uint32_t face) {
   const glm::dvec3 &a = mesh.position(t.x), &b = mesh.position(t.y), &c = mesh.position(t.z);
   std::vector<Measured> measured;
   measured.reserve(points.size());
-  for (const glm::dvec3& p : points) measured.push_back({p, closest_point(p, a, b, c).distance_squared});
+  for (const glm::dvec3& p : points) {
+    const ClosestPoint nearest = closest_point(p, a, b, c);
+    measured.push_back({p, nearest.distance_squared, nearest.weights});
+  }
   thin(measured, 0.5 * glm::length(glm::cross(b - a, c - a)));
   const double weight = 1 / static_cast<double>(std::max(measured.size(), kLeastSamples));
   const double limit = mesh.certified()->forward().limit();
   for (const Measured& m : measured) {
     const double square = m.square / (limit * limit);
-    samples_[face].push_back({m.point, weight, std::sqrt(square)});
+    samples_[face].push_back({m.point, weight, std::sqrt(square), m.weights});
     energy_[face] += weight * square * square * square * square;
   }
 }

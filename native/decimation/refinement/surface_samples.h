@@ -18,7 +18,8 @@ namespace tolvol {
 struct SurfaceSample {
   glm::dvec3 point;
   double weight;
-  double deviation;  ///< Its deviation from the face now, over the tolerance.
+  double deviation;    ///< Its deviation from the face now, over the tolerance.
+  glm::dvec3 weights;  ///< The barycentric coordinates of the point of the face that is nearest to it.
 };
 
 class SurfaceSamples {
