@@ -132,7 +132,9 @@ TEST(PatchDeviations, AreAtLeastTheTrueOnesAndEqualThemWhereTheyAreLarge) {
       std::uint32_t face = term.face;
       const double found = std::sqrt(term.square), exact = f.deviations.deviation(term.target, face);
       EXPECT_GE(found, exact - 1e-9);
-      if (found > 1) EXPECT_NEAR(found, exact, 1e-9);
+      if (found > 1) {
+        EXPECT_NEAR(found, exact, 1e-9);
+      }
     }
   }
 }
