@@ -113,6 +113,15 @@ def decimate_settings(options=frozenset()):
             subtype="ANGLE",
             options=set(options),
         ),
+        "outside": EnumProperty(
+            name="Outside",
+            description="How Decimate treats faces that are not within the tolerance of the reference before it begins",
+            items=(
+                ("ERROR", "Stop", "Change nothing and report the number of such faces"),
+                ("KEEP", "Keep", "Leave such faces as they are and decimate the rest"),
+            ),
+            options=set(options),
+        ),
         "max_seconds": FloatProperty(
             name="Time Limit",
             description="Seconds after which the decimation of an object ends with the result that is proved by then. 0 "

@@ -14,7 +14,7 @@ from ..shared.errors import Refused
 class Claim:
     def __init__(self, ob):
         self._ob = ob
-        self._name = ob.name
+        self.name = ob.name
         self._mesh, self._content, self._place = self._state(), self._digest(), self._placed()
 
     def concerns(self, data):
@@ -26,7 +26,7 @@ class Claim:
 
     def renewed(self):
         """Returns the object after an undone step that has changed nothing: Blender may have made object and mesh anew."""
-        self._ob = bpy.data.objects.get(self._name, self._ob)
+        self._ob = bpy.data.objects.get(self.name, self._ob)
         self._mesh = self._ob.data.as_pointer(), *self._mesh[1:]
         return self._ob
 
@@ -35,9 +35,9 @@ class Claim:
         try:
             name = self._ob.name
         except ReferenceError:
-            raise Refused(f"{self._name} was deleted meanwhile: nothing was changed") from None
-        if name != self._name:
-            raise Refused(f"{self._name} was renamed to {name} meanwhile: nothing was changed")
+            raise Refused(f"{self.name} was deleted meanwhile: nothing was changed") from None
+        if name != self.name:
+            raise Refused(f"{self.name} was renamed to {name} meanwhile: nothing was changed")
         if self._state() != self._mesh or thoroughly and self._digest() != self._content:
             raise Refused(f"The mesh or the mode of {name} was changed meanwhile: nothing more was changed")
         (matrix, reference), (matrix_before, reference_before) = self._placed(), self._place

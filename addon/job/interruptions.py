@@ -4,6 +4,7 @@
 from bpy.app.handlers import persistent
 
 from .. import handlers, status_bar
+from . import refusals
 
 # Only the main thread uses these.
 runs = []  # each a Run (see run.py); more than one only until the next event, after Adjust Last Operation
@@ -31,6 +32,7 @@ def _interrupt(happens):
 @persistent
 def _before_load(*_):
     _interrupt("another file was opened")
+    refusals.forget_all()
 
 
 @persistent

@@ -11,7 +11,7 @@ from ..background import Job
 from ..redraw import redraw_sidebars
 from ..shared.errors import Refused
 from ..wrapping import popup_text
-from . import interruptions, progress_text
+from . import interruptions, progress_text, refusals
 from .claim import Claim
 
 # Blender waits so many seconds for a job, which is about as long as a person takes for at once. A longer job goes on while
@@ -50,6 +50,7 @@ class Run:
         self.something_else = False  # whether Blender has reported a change since begin_modal()
         self._mode, self._clock = context.mode, progress_text.Clock()
         self._claims = [Claim(ob) for ob in operator.objects]
+        refusals.forget(self._names())
         self._steps = operator.steps(context)
         self._job = None
         self._timer = None
@@ -108,8 +109,12 @@ class Run:
             self.voice.report({"INFO"}, f"{self.label} was cancelled. {left}")
             return {"CANCELLED"}
         except (Refused, native.module.TolvolError) as error:
+            refusals.keep(self._names(), self.label, native.said(error))
             self.voice.report({"ERROR"}, popup_text(native.said(error)))
             return {"CANCELLED"}
+
+    def _names(self):
+        return [claim.name for claim in self._claims]
 
     def go_on(self, seconds):
         """Does as many steps as the time permits. Returns the operator's result if it has ended, else None."""

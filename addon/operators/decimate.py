@@ -4,7 +4,7 @@
 import contextlib
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty
+from bpy.props import BoolProperty
 
 from .. import preferences
 from ..job import WRITE, JobOperator, breathe
@@ -41,7 +41,7 @@ def draw_advanced_settings(context, layout, settings):
     column = layout.column()
     column.active = settings.close_holes
     property_fields(context, column, settings, "largest_perimeter")
-    property_fields(context, layout, settings, "crossings", "max_normal_angle")
+    property_fields(context, layout, settings, "crossings", "max_normal_angle", "outside")
 
 
 def draw_protect_settings(context, layout, settings, ob):
@@ -92,15 +92,6 @@ object. An object without a reference gets one first, as by Set Reference"""
         description="No placement was chosen: the placement depends on the UV maps of each mesh",
         options={"HIDDEN", "SKIP_SAVE"},
     )
-    outside: EnumProperty(
-        name="Outside",
-        description="How to treat faces that are not within the tolerance of the reference before the decimation",
-        items=(
-            ("ERROR", "Stop", "Change nothing and report the number of such faces"),
-            ("KEEP", "Keep", "Leave such faces as they are and decimate the rest"),
-        ),
-        options={"SKIP_SAVE"},
-    )
     threads: threads_setting()
 
     @classmethod
@@ -116,7 +107,6 @@ object. An object without a reference gets one first, as by Set Reference"""
         layout.prop(self, "keep")
         draw_decimate_settings(layout, self)
         draw_protect_settings(context, layout, self, context.active_object)
-        layout.prop(self, "outside")
         draw_advanced_settings(context, layout, self)
 
     def targets(self, context):
@@ -148,7 +138,8 @@ object. An object without a reference gets one first, as by Set Reference"""
         tolerance = tolerances.tolerance_length(self, reference.size())
         placement = automatic_placement(ob.data) if self.own_placements else self.placement
         options = decimation.options(self, placement, self.threads or preferences.threads(context))
-        return decimation.task(ob, surface, reference, tolerance, self, options | {"outside": self.outside.lower()})
+        options["outside"] = self.outside.lower()
+        return decimation.task(ob, surface, reference, tolerance, self, options)
 
     def _prepared(self, stack, outcomes):
         """A generator for steps(): returns the prepared Writing of each object, in contexts of the stack."""

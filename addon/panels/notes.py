@@ -9,6 +9,7 @@ import datetime
 
 import bpy
 
+from ..job import refusals
 from ..operators import blocked
 from ..overlay import reasons
 from ..proof import kept_warnings, last_run, verdict
@@ -35,6 +36,8 @@ def notes(context, ob):
     lines = []
     if reason := in_the_way(ob):
         lines.append((reason, "ERROR"))
+    if refused := refusals.of(ob):
+        lines.append((refused, "ERROR"))
     found = verdict.of(ob)
     if found is not None and found.kind != verdict.WITHIN:
         lines.append((found.line(), AMBER if found.passed else RED))

@@ -155,7 +155,7 @@ def test_a_running_job_has_four_rows_and_a_bar_where_blender_has_one(monkeypatch
         assert layout.shown[1][2]["text"] == "Decimating (25%)"
 
 
-NAMES = "Time Limit", "Largest Perimeter", "Crossings", "Normals"
+NAMES = "Time Limit", "Largest Perimeter", "Crossings", "Normals", "Outside"
 
 
 @pytest.mark.parametrize(("width", "above"), ((400, ()), (230, NAMES[1:2]), (190, NAMES[:3])))

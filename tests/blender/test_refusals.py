@@ -5,7 +5,10 @@ import bpy
 import pytest
 from mathutils import Matrix
 
+from addon.job import refusals
 from addon.operators import blocked
+from addon.panels import notes
+from addon.proof import verdict
 from addon.reference import measurements
 from scenes import activate, add_object, link, moved_up, sheet, stored, torus
 
@@ -103,7 +106,7 @@ def test_what_the_module_refuses_is_said_in_the_panels_words():
     for operator in (bpy.ops.tolvol.decimate, bpy.ops.tolvol.smooth):
         with pytest.raises(
             RuntimeError,
-            match=r"faces are .* take a larger tolerance or replace the reference\. Select Outside.* once the "
+            match=r"faces are .* take a larger tolerance, replace the reference, or choose Outside: Keep.* once the "
             "reference is set",
         ) as said:
             operator()
@@ -120,3 +123,36 @@ def test_what_the_module_refuses_is_said_in_the_panels_words():
         bpy.ops.tolvol.decimate()
     assert "=" not in str(said.value)
     assert bpy.ops.tolvol.decimate(keep="ONE") == {"FINISHED"}
+
+
+def kept_reasons():
+    return [text for text, _ in notes.notes(bpy.context, bpy.context.object)[0] if " was refused at " in text]
+
+
+def test_notes_keep_the_reason_until_the_next_operation(tmp_path):
+    ob = moved_up()
+    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.05
+    beside = sheet("beside", bumps=0.0)
+    activate(ob)
+    assert not kept_reasons()
+    refused("faces are not within")
+    (said,) = kept_reasons()
+    assert said.startswith("Decimate in Tolerance was refused at ") and "faces are not within the tolerance" in said
+    assert refusals.of(beside) is None
+    assert bpy.ops.tolvol.check() == {"FINISHED"}
+    assert not kept_reasons()
+    refused("faces are not within")
+    path = str(tmp_path / "scene.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    assert kept_reasons()
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert not kept_reasons()
+
+
+def test_outside_keep_is_a_setting_of_the_object():
+    ob = moved_up()
+    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.05
+    refused("choose Outside: Keep")
+    ob.tolvol.outside = "KEEP"
+    assert bpy.ops.tolvol.decimate() == {"FINISHED"}
+    assert verdict.word(ob) == verdict.FAIL
