@@ -20,6 +20,8 @@ using glm::dvec3;
 constexpr double kRounding = 16 * 0x1p-53;
 /// What products that are too small for double precision lose, and the largest product that is trusted.
 constexpr double kSmallest = 1e-300, kLargest = 1e300;
+/// More than what the difference of two products loses in which they are too small. A large factor makes it count.
+constexpr double kLost = 4 * std::numeric_limits<double>::denorm_min();
 
 double sum(const dvec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 
@@ -68,7 +70,8 @@ int side(const dvec3& u, const dvec3& v, const dvec3& p) {
   const dvec3 normal = glm::cross(u, v);
   const dvec3 most(std::abs(u.y * v.z) + std::abs(u.z * v.y), std::abs(u.z * v.x) + std::abs(u.x * v.z),
                    std::abs(u.x * v.y) + std::abs(u.y * v.x));
-  const double volume = glm::dot(normal, p), error = kRounding * glm::dot(most, glm::abs(p)) + kSmallest;
+  const double volume = glm::dot(normal, p);
+  const double error = kRounding * glm::dot(most, glm::abs(p)) + kLost * sum(p) + kSmallest;
   return volume > error ? 1 : volume < -error ? -1 : 0;
 }
 

@@ -184,6 +184,25 @@ TEST(FacesApart, WhatCrossesIsNeverSurelyUncrossedAtAnySize) {
   EXPECT_GT(crossing, 500u);
 }
 
+TEST(FacesApart, TinyEdgesAreNotTakenForSureBesideHugeOnes) {
+  // The products of the tiny edges are too small for double precision. The huge corner lies in the plane of all.
+  shapes::Random random(9);
+  const double tiny = 0x1p-540, huge = 0x1p280;
+  std::size_t crossing = 0;
+  for (int i = 0; i < 2'000; ++i) {
+    const auto whole = [&] { return dvec3(random.below(12), random.below(12), random.below(12)) - dvec3(6); };
+    const dvec3 u = whole(), v = whole();
+    const auto in_plane = [&] { return huge * (double(random.below(5) + 1) * v + (double(random.below(9)) - 4) * u); };
+    const Corners a{dvec3(0), tiny * u, tiny * v};
+    for (const Corners& b : {Corners{dvec3(0), tiny * u, in_plane()}, Corners{dvec3(0), in_plane(), in_plane()}}) {
+      if (!faces_cross(a, b)) continue;
+      ++crossing;
+      ASSERT_FALSE(surely_uncrossed(a, b) || surely_uncrossed(b, a)) << i;
+    }
+  }
+  EXPECT_GT(crossing, 1'000u);
+}
+
 TEST(FacesApart, TheGapGrowsWithTheSize) {
   const Corners above{dvec3(0, 0, 0.5), dvec3(4, 0, 0.5), dvec3(0, 4, 0.5)};
   for (const double size : {1e-90, 1e-80, 1e-70, 1e-30, 1e30, 1e70}) {
