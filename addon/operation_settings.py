@@ -84,8 +84,8 @@ def decimate_settings(options=frozenset()):
                     "THOROUGH",
                     "Thorough",
                     "After the pass of Fast, move vertices around each further collapse together. This leaves a "
-                    "third fewer triangles in 6 to 35 times the processor time, at a tolerance of 0.1 % in 20 to 45 "
-                    "times. Some hundred triangles may take 20 seconds",
+                    "third fewer triangles in 5 to 25 times the processor time. Some hundred triangles may take 75 "
+                    "times as long, and 20 seconds",
                 ),
             ),
             options=set(options),

@@ -16,18 +16,23 @@ _BESIDE_BOX, _BESIDE_LABEL = 64, 4
 _PIECES = re.compile(r"[^ /\\]+[ /\\]*|[ /\\]+")
 
 
-def _room(context):
-    """Sets the font of the panels. Returns how many pixels a text may be wide."""
+def _measures(context):
+    """Sets the font of the panels. Returns the width of the region in pixels, and the scale of the interface."""
     scale = context.preferences.system.ui_scale
     blf.size(_FONT, context.preferences.ui_styles[0].widget.points * scale)
-    return max(context.region.width, 100) - _BESIDE_TEXT * scale
+    return max(context.region.width, 100), scale
+
+
+def _room(context):
+    """Sets the font of the panels. Returns how many pixels a text may be wide."""
+    width, scale = _measures(context)
+    return width - _BESIDE_TEXT * scale
 
 
 def _room_in_box(context, share):
-    """Does the same for a text that has this share of a box's width."""
-    _room(context)
-    scale = context.preferences.system.ui_scale
-    return share * (max(context.region.width, 100) - _BESIDE_BOX * scale) - _BESIDE_LABEL * scale
+    """Sets the font of the panels. Returns how many pixels a text may be wide that has this share of a box's width."""
+    width, scale = _measures(context)
+    return share * (width - _BESIDE_BOX * scale) - _BESIDE_LABEL * scale
 
 
 def _width(text):
@@ -90,13 +95,12 @@ def _fits(context, known):
 
 
 def property_fields(context, layout, settings, *names):
-    """Draws properties, each with its name beside its field, or above it if there is no room."""
+    """Draws properties, each with its name beside its field, or above the field if name or choices have no room there."""
     for name in names:
         known = settings.rna_type.properties[name]  # bl_rna of an operator does not list its properties.
         if _fits(context, known):
-            layout.row(align=True).prop(
-                settings, name
-            )  # In a row, the buttons of several choices are beside each other.
+            # In a row, the buttons of a property with several choices are beside each other.
+            layout.row(align=True).prop(settings, name)
             continue
         column = layout.column(align=True)
         column.use_property_split = False
@@ -109,11 +113,11 @@ _POPUP = 100  # characters in a line
 
 
 def popup_text(text):
-    """Returns the text of an error in lines for Blender's popup, which is cut off at the edge of the window. A script gets it
-    in one line."""
+    """Returns the text of an error in lines for Blender's popup, which does not break lines and is cut off at the edge of the
+    window. Without a window it is the text in one line, as scripts show it."""
     if bpy.app.background:
         return text
-    # In the status bar Blender leaves out the end of a line.
+    # The status bar shows all lines in one, without the ends of lines: a blank has to part their words.
     return " \n".join(textwrap.wrap(text, _POPUP, break_long_words=False, break_on_hyphens=False))
 
 

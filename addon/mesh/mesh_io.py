@@ -261,14 +261,14 @@ def loose_edges(mesh):
     return column(mesh.edges, "vertices", 2, np.int32)[loose]
 
 
-# UVs of corners at one vertex that differ by less than this are of one island: rounding makes them differ, as in Blender's
-# own grid. It holds for UVs up to 1, and grows with larger ones.
+# UVs at one vertex that differ by less than this belong to one island: rounding makes them differ, as in Blender's own grid.
+# The number is for UVs up to 1, and is multiplied by larger ones.
 _SAME_UV = 2.0**-20
 
 
 def corner_uvs(mesh):
-    """Returns (corners, 2 * layers) float32: the values of all UV maps, equal at the corners of a vertex that differ only by
-    rounding. They tell islands apart, and are not for writing. Returns None if there are no UV maps."""
+    """Returns (corners, 2 * layers) float32: the values of all UV maps, of which those at one vertex that differ only by
+    rounding are made equal. They tell islands apart, and are not for writing. Returns None if there are no UV maps."""
     if not mesh.uv_layers:
         return None
     uvs = np.hstack([column(layer.data, "uv", 2) for layer in mesh.uv_layers])
@@ -285,7 +285,10 @@ def corner_uvs(mesh):
 
 
 def _joined(groups, values):
-    """Returns the values, those of a group made equal that differ by less than _SAME_UV, also by way of others."""
+    """Returns values. Those of a group that differ by less than _SAME_UV are made equal, and so are all of a chain of such.
+
+    groups: (n,) the group of each value; values: (n,) float32
+    """
     order = np.lexsort((values, groups))
     groups, values = groups[order], values[order]
     begins = np.ones(len(order), bool)

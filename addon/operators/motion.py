@@ -20,7 +20,6 @@ from ..shared.surface import Surface
 
 _FOUND = {"forward": "the result is {} from the reference", "backward": "the reference is {} from the result"}
 
-
 BENT = "Corners of bent quads stay where cutting these along their other diagonal would leave the tolerance"
 
 # settle() holds a mesh back at most so many times. Each time more corners stay, so that the first time is mostly enough.
@@ -79,7 +78,8 @@ class Motion:
         )
         warnings = held.report["warnings"]
         if outside == "keep" and held.report["outside"]["reference_faces"]:
-            # The mesh that is shown was within the tolerance: the first pass has refused it otherwise, and said all else.
+            # The triangles that Blender shows are within the tolerance, or the first pass would have refused the mesh. The
+            # other warnings are those of the first pass.
             warnings = [BENT]
         self.warnings += [text for text in warnings if text not in self.warnings]
         return held.vertices

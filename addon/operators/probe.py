@@ -16,6 +16,7 @@ from ..reference import measurements, snapshots, tolerances
 from ..shared.errors import Refused
 from ..shared.proof import report
 from ..units import length
+from ..wrapping import popup_text
 from .blocked import allowed, check_blocked, object_blocked
 from .original import OF_THE_VIEW
 
@@ -123,7 +124,7 @@ reference is coloured, else of the mesh. A click leaves a label there. Esc, or a
             try:
                 reading = self._read(context, ob, area, region, view)
             except (Refused, native.module.TolvolError) as error:
-                self.report({"ERROR"}, native.said(error))
+                self.report({"ERROR"}, popup_text(native.said(error)))
                 return self._end(context)
             if event.type == "LEFTMOUSE" and event.value == "PRESS" and reading is not None and not event.alt:
                 labels.add(ob, reading)

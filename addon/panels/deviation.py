@@ -98,7 +98,7 @@ def _why_not_checked(ob):
         return measuring.failure(ob) or "Being measured"
     own = ob.tolvol.snapshot is None and ob.tolvol.reference_kind == "SELF"
     if own and not blocked.decimate_blocked(ob):
-        return "Press Decimate, or set the reference first"  # The first operation sets it, too.
+        return "Press Decimate, or set the reference first"  # The first operation sets the reference, too.
     return blocked.check_blocked(ob) or "Press Check to measure it"
 
 

@@ -34,6 +34,7 @@ _NAME = 0.36  # the part of a row that is for the name of a level
 def _draw_level(context, column, made, i):
     """Draws the name of a level, its triangles and its deviation, which has a row of its own in a narrow sidebar."""
     narrow = is_narrow(context)
+    # The object itself, which is the first level, may have a long name.
     row = column.row() if narrow or not i else column.split(factor=_NAME)
     if i < len(made):
         level = made[i]

@@ -21,8 +21,8 @@ class NearTriangles {
  public:
   /// Begins with a new piece, whose whole has of = 0. Keeps references. `hierarchy` holds the triangles, which must be
   /// as large as in a frame. `radius` is the largest radius that nearest() will be asked for. If `facing` is not null,
-  /// there are only the triangles that it admits. If `steps` is not null, what nearest() takes is
-  /// added to it, in visits of a node.
+  /// there are only the triangles that it admits. If `steps` is not null, nearest() adds its steps
+  /// to it: one for a node that it visits, and one for four triangles of a list.
   void begin(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, double radius,
              const Facing* facing = nullptr, std::size_t* steps = nullptr);
 

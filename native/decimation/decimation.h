@@ -86,7 +86,7 @@ struct DecimationResult {
 /// and where the stored type cannot hold the tolerance; Cancelled. On one thread Effort::fast takes 5 to 7 us a
 /// triangle at a tolerance of 1 % and 30 to 39 us at 0.1 %, with the grid of the volume and crossings allowed.
 /// Effort::thorough then collapses more edges, and moves the vertices around each together: a third fewer triangles in
-/// 6 to 35 times the processor time, at 0.1 % 20 to 45 times. Some hundred triangles may take 20 seconds.
+/// 5 to 25 times the processor time. A mesh of some hundred triangles may take 75 times as long, and 20 seconds.
 DecimationResult decimate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                           const StoredSpace& space, const ToleranceVolume* volume, const DecimationOptions& options);
 

@@ -18,10 +18,11 @@
 // If of two points of the mesh (half size 1) one is nearer as seen from there, it is nearer to the point itself too, up
 // to 2 / R, which is below one rounding of the distance, R or more.
 #include "geometry/hierarchy.h"
-#include "geometry/lengths.h"
 
 #include <algorithm>
 #include <cmath>
+
+#include "geometry/lengths.h"
 
 namespace tolvol {
 

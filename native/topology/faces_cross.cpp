@@ -4,7 +4,6 @@
 // are asked about are neighbours, and most of these are told apart by the sides of the planes that their corners lie
 // on.
 #include "topology/faces_cross.h"
-#include "geometry/lengths.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/intersections.h>
@@ -12,6 +11,8 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include "geometry/lengths.h"
 
 namespace tolvol {
 namespace {

@@ -35,18 +35,22 @@ _sending = []  # the xdotool that sends all events
 def xdotool(*arguments):
     """Gives commands to xdotool, and returns once the server has their events.
 
-    One xdotool takes all commands from its input: to start another one takes many times as long as to send an event.
+    One xdotool takes all commands from its input: to start another one takes many times as long as to send an event. No
+    argument may hold a quotation mark.
     """
-    if not _sending:
-        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-        _sending.append(subprocess.Popen(["xdotool", "-"], text=True, **pipes))
+    if not _sending or _sending[0].poll() is not None:
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+        _sending[:] = [subprocess.Popen(["xdotool", "-"], text=True, **pipes)]
     words = [f'"{word}"' if " " in word else word for word in map(str, arguments)]
-    # It cuts long lines, so that each command has one of its own.
+    # xdotool cuts long lines, so that each command has a line of its own.
     lines = "".join(f"\n{word}" if word in _COMMANDS else f" {word}" for word in words)
     # The answer to a question comes after the server has taken all that was sent before.
     _sending[0].stdin.write(f"{lines.lstrip()}\ngetmouselocation\n")
     _sending[0].stdin.flush()
-    assert _sending[0].stdout.readline(), f"xdotool has ended at {arguments}"
+    answer = _sending[0].stdout.readline()
+    if not answer.startswith("x:"):  # xdotool complains of a command that it refuses, and goes on.
+        _sending.pop().kill()
+        raise AssertionError(f"xdotool refuses {arguments}: {answer}")
 
 
 def click(x, y):
@@ -428,11 +432,11 @@ def close_other_areas():
     yield from finished(lambda: hasattr(bpy.context, "object"))
 
 
-NARROW, WIDE = 720, 1060  # pixels: the first leaves room for the sidebar and for a view as wide
+NARROW, WIDE = 720, 1060  # widths of the window in pixels: a narrow one has room for the sidebar and a view beside it
 
 
 def resize(width, height):
-    """Gives the window another size. To draw it in software takes as long as it has pixels."""
+    """Gives the window another size. Drawing in software takes as long as there are pixels."""
     window = view()[0]
     shell = subprocess.run(["xdotool", "search", "--class", "blender"], check=True, capture_output=True, text=True)
     xdotool("windowsize", shell.stdout.split()[-1], width, height)

@@ -101,8 +101,8 @@ def add(parser):
         "--effort",
         choices=("fast", "thorough"),
         default="fast",
-        help="thorough: a third fewer triangles in 6 to 35 times the processor time, at a tolerance of 0.1%% in 20 to 45 "
-        "times; a mesh of some hundred triangles may take 20 seconds (default: fast)",
+        help="thorough: a third fewer triangles in 5 to 25 times the processor time; a mesh of some hundred triangles may "
+        "take 75 times as long, and 20 seconds (default: fast)",
     )
     parser.add_argument(
         "--crossings",

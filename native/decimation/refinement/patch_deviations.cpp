@@ -14,9 +14,10 @@ constexpr double kUnknown = std::numeric_limits<double>::infinity();
 constexpr double kVertexWeight = 0.05, kEdgeWeight = 0.03, kFaceWeight = 0.05;
 /// A search that looks around looks at all faces if a deviation is beyond this share of the tolerance.
 constexpr double kLookEverywhereAbove = 0.98;
-/// A search starts where the point that was nearest has a larger squared deviation: it is beyond the tolerance.
+/// renew() searches for a point if the one that was nearest to it is at more than this squared deviation: it is beyond
+/// the tolerance.
 constexpr double kSearchAbove = 1;
-/// A step of a relaxation searches where the energy is more than this share of that of the largest deviation.
+/// A step of a relaxation searches for a point if its energy is more than this share of that of the largest deviation.
 constexpr double kFollowed = 3e-4;
 /// The search for the nearest face crosses at most this many edges or corners.
 constexpr int kMostCrossings = 16;
@@ -102,6 +103,7 @@ void PatchDeviations::add(std::span<const SurfaceSample> samples, std::uint32_t 
   const bool is_as_it_was = !patch_->faces()[face].changed;
   for (const SurfaceSample& s : samples) {
     add_reference_point(s, face);
+    // A sample has the weights of its nearest point for the corners that its face has in the mesh.
     if (is_as_it_was) terms_.back().weights = s.weights, terms_.back().square = s.deviation * s.deviation;
   }
 }
@@ -258,8 +260,9 @@ PatchDeviations::Term PatchDeviations::into_half_space(const HeldPoint& p) const
   return {Patch::kNone, p.point.weights, x + missing * p.normal, missing * p.normal, missing * missing * unit2_};
 }
 
-/// The term as the patch is now, if the point that was nearest still is the nearest one. Otherwise the true deviation
-/// is less. Returns nullopt if the square was or is more than `most_square`.
+/// The term as the patch is now, with the point that was nearest in the place of the nearest one. Of open points alone
+/// the true deviation may be more. Returns nullopt for a point that is new, and where the square was or is more than
+/// `most_square`.
 std::optional<PatchDeviations::Term> PatchDeviations::followed(std::size_t term, double most_square) const {
   if (term >= terms_.size() || terms_[term].square > most_square) return std::nullopt;
   Term now = terms_[term];
@@ -273,8 +276,8 @@ std::optional<PatchDeviations::Term> PatchDeviations::followed(std::size_t term,
   return now;
 }
 
-/// Finds the terms of all points, as the patch is now. Those up to a squared deviation follow the points that were
-/// nearest. The search for a nearest face begins at that of terms_.
+/// Finds the terms of all points, as the patch is now: up to the squared deviation `followed_up_to` by followed(), and
+/// beyond by a search. The search for a nearest face begins at that of terms_.
 void PatchDeviations::evaluate(bool look_around, double followed_up_to, std::vector<Term>& terms) {
   terms.clear();
   for (std::size_t i = 0; i < points_.size(); ++i) {

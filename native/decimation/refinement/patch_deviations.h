@@ -29,15 +29,15 @@ class PatchDeviations {
   void start(Patch& patch);
   Patch& patch() const { return *patch_; }
 
-  /// Adds the samples of a face of the mesh. They are nearest to `face`, which it is or which takes its place, or to
-  /// faces near by.
+  /// Adds the samples of a face of the mesh. `face` is the place of this face in the patch, or of the one that takes
+  /// over its points. The samples are nearest to `face` or to faces near by.
   void add(std::span<const SurfaceSample> samples, std::uint32_t face);
   /// Adds a point of the reference, which is nearest to `face` or to a face near by.
   void add_reference_point(const glm::dvec3& point, double weight, std::uint32_t face);
   /// Adds a point of a face, by its barycentric coordinates, to be held near the reference.
   void add_face_point(std::uint32_t face, const glm::dvec3& weights, double weight);
   /// The same for a point that has no proof: it is held near those triangles of the reference that the rule of facing
-  /// admits for the face, as it is turned at every step. A search of the reference finds them, in some microseconds.
+  /// admits for the face, as it is turned at each search for the point. The search takes some microseconds.
   void add_open_point(std::uint32_t face, const glm::dvec3& weights, double weight);
   /// Adds a point of a face to be held in a half-space. Its deviation is 1 at the half-space's end and 0 one tolerance
   /// inside.
@@ -47,14 +47,16 @@ class PatchDeviations {
   bool has_separations() const { return !separations_.empty(); }
 
   /// Finds the deviations of all points, as the patch is now. It is needed after points were added or positions were
-  /// changed. It searches only for points beyond the tolerance. For the others the point that was nearest counts as
-  /// nearest still, so that their deviation may be less than what is found.
+  /// changed. It searches only for new points and for points beyond the tolerance, and after points of the reference
+  /// were added for all points of faces. For the others the point that was nearest counts as nearest still. Their
+  /// deviations may therefore be less than what is found; those of open points may also be more, where the face has
+  /// turned since the search.
   void renew();
   /// The same, and keeps what it finds if the energy is less than before. Returns whether it is. It searches for all
   /// points whose energy is not negligible beside that of the largest deviation. Unless `look_around`, the search for
   /// the nearest face ends where no face beside it is nearer.
   bool renew_if_lower(bool look_around);
-  /// The same without looking around after flips, which change the edges and faces that have points. It keeps what it
+  /// The same as renew_if_lower(false) after flips, which change the edges and faces that have points. It keeps what it
   /// finds in any case.
   void renew_after_flips();
 
@@ -93,8 +95,8 @@ class PatchDeviations {
     glm::dvec3 weights;   ///< The barycentric coordinates of the point of the face.
     glm::dvec3 target;    ///< The other point.
     glm::dvec3 residual;  ///< From the point of the face to the other one.
-    double square;        ///< The squared deviation, over the tolerance that the face may use; infinite until it is
-                          ///< found first.
+    double square;        ///< The squared deviation, over the tolerance that the face may use; infinite before the
+                          ///< first search.
   };
   /// One term for each point. Those of the reference come first.
   std::span<const Term> terms() const { return terms_; }
@@ -115,7 +117,7 @@ class PatchDeviations {
   double energy(std::size_t term, double square) const { return weight(term) * power_of(square, power_ / 2); }
 
   /// The squared deviation at which the energy is this share of that of the largest deviation, or of a deviation of one
-  /// tolerance if that is less.
+  /// tolerance if that is less, for a point of the same weight.
   double square_at(double share) const {
     const double deviation = std::min(1.0, now_.largest) * std::pow(share, 1.0 / power_);
     return deviation * deviation;

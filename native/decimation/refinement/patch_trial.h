@@ -57,7 +57,7 @@ class PatchTrial {
   /// The largest deviation, over the tolerance, that the last try came to from its first start; infinite if it had
   /// none.
   double reached() const { return reached_; }
-  /// The number of deviations that the last try found: the same for each number of threads.
+  /// The number of searches of the last try (PatchDeviations::work()): the same for each number of threads.
   std::size_t work() const { return work_; }
   /// The patch of the last try.
   const Patch& patch() const { return patch_; }
