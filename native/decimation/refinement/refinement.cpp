@@ -29,8 +29,8 @@ constexpr struct {
   std::size_t most_edges;
 } kRounds[] = {
     {2, false, kAnyNumber}, {3, false, kAnyNumber}, {4, false, kAnyNumber}, {2, true, kAnyNumber}, {3, true, kMany}};
-/// All rounds with many starts together may take as much work as the rounds before them, and kStartsWork more: most of
-/// what they remove comes early, and of a small part with straight edges they would try the same edges for minutes.
+/// All rounds with many starts together may take as many searches as the rounds before them, and kStartsWork more: most
+/// of what they remove comes early, and of a small part with straight edges they would try the same edges for minutes.
 constexpr std::size_t kStartsWork = 50'000'000;
 /// An edge is not tried if the deviation with its vertex alone moved is beyond so many tolerances.
 constexpr double kMostLargest = 2;
