@@ -394,6 +394,6 @@ def test_the_lines_of_an_error_have_room_in_blenders_popup():
     except RuntimeError as error:
         said = str(error).removeprefix("Error: ")
     lines = said.splitlines()
-    assert len(lines) == 2 and all(len(line) <= 101 for line in lines)
-    # The status bar shows both as one.
+    assert len(lines) == 3 and all(len(line) <= 101 for line in lines)
+    # The status bar shows them as one.
     assert "Select Outside shows these faces" in "".join(lines)
