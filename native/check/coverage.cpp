@@ -27,6 +27,9 @@ constexpr std::size_t kBudgetOfChange = 1 << 12;
 constexpr std::size_t kBudgetOfElement = 64, kBudgetOfFirst = 1 << 16;
 // Of such a triangle it looks at this many parts. All such triangles share a further budget, as large as the one above.
 constexpr std::size_t kBudgetOfBeyond = 64;
+// A part of such a triangle counts once more for each so many nodes that the searches for it visit. Near a vertex of
+// thousands of needles each search visits all of them.
+constexpr std::size_t kNodesOfPart = 64;
 // The budget grows by this many pieces for each piece that a change places.
 constexpr std::size_t kBudgetOfPiece = 4;
 // A triangle of so many pieces, all of which lose their witness, is placed as a whole even if each piece has a budget.
@@ -47,10 +50,10 @@ FourPoints with_centre(const Part& part) {
   return points;
 }
 
-/// Takes one from the budget, if there is any left.
-bool take(std::size_t& budget) {
+/// Takes parts from the budget, if there are any left.
+bool take(std::size_t& budget, std::size_t parts) {
   if (budget == 0) return false;
-  --budget;
+  budget -= std::min(budget, parts);
   return true;
 }
 
@@ -133,9 +136,11 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
         std::sqrt(std::max({glm::dot(c[0] - centre, c[0] - centre), glm::dot(c[1] - centre, c[1] - centre),
                             glm::dot(c[2] - centre, c[2] - centre)}));
     found_beyond = found_beyond || closest.distance > provable;
+    const std::size_t parts = found_beyond ? 1 + (common.nodes + closest.nodes) / kNodesOfPart : 1;
+    looked += parts;
     const double floor = (found_beyond ? kShortestPiece : kHeadroom) * limit_;
     const bool finest =
-        longest_squared(piece) <= floor * floor || piece.cuts == kMostCuts || !may_look(++looked, found_beyond);
+        longest_squared(piece) <= floor * floor || piece.cuts == kMostCuts || !may_look(looked, parts, found_beyond);
     const bool is_beyond = closest.distance > provable + radius;
     if (is_beyond || finest) {
       if (!is_beyond) uncovered.in_part.push_back(piece);
@@ -148,10 +153,10 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
   }
 }
 
-/// Whether find_witnesses() may look at this many parts of a triangle.
-bool Coverage::may_look(std::size_t parts, bool found_beyond) {
-  if (!found_beyond) return parts <= kBudgetOfChange || take(budget_of_first_);
-  return parts <= kBudgetOfBeyond || (parts <= kBudgetOfChange && take(budget_of_beyond_));
+/// Whether find_witnesses() may look at `parts` more parts of a triangle, which are `looked` together.
+bool Coverage::may_look(std::size_t looked, std::size_t parts, bool found_beyond) {
+  if (!found_beyond) return looked <= kBudgetOfChange || take(budget_of_first_, parts);
+  return looked <= kBudgetOfBeyond || (looked <= kBudgetOfChange && take(budget_of_beyond_, parts));
 }
 
 void Coverage::sample(std::uint32_t element, std::size_t stride, std::vector<Sample>& out) const {

@@ -106,7 +106,7 @@ class Coverage {
   Part whole(std::uint32_t triangle) const { return PieceList::whole(triangle, *reference_); }
   void find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mesh, const Hierarchy& hierarchy,
                          std::span<const std::uint32_t> ids, double provable, Uncovered& uncovered);
-  bool may_look(std::size_t parts, bool found_beyond);
+  bool may_look(std::size_t looked, std::size_t parts, bool found_beyond);
   struct Placing;
   template <class Call>
   bool for_each_to_place(const PieceList& pieces, bool of_many, std::vector<std::uint32_t>& gathered,

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <memory>
 
 #include "check/tolerance_volume.h"
@@ -67,9 +68,8 @@ TEST(MovingCoverage, ATipMayGoDownByTheToleranceAndNoFurther) {
   EXPECT_TRUE(scene.tried(kTip, {0, 0, -0.095}).empty()) << "a trial must change nothing";
 }
 
-// Beyond the tolerance there is no witness, however small the parts are.
-TEST(MovingCoverage, AStartFarFromTheReferenceTakesFewPartsOfATriangle) {
-  const TriangleMesh reference = shapes::squares(30, [](const dvec3& p) { return 20.0 * p; });
+/// How often the first look at a mesh polls whose vertices are up to two tolerances from their places in the reference.
+std::size_t polls_from_afar(const TriangleMesh& reference) {
   shapes::Random random(1);
   TriangleMesh moved = reference;
   for (dvec3& p : moved.vertices) p += 2 * kTolerance * random.point();
@@ -79,11 +79,28 @@ TEST(MovingCoverage, AStartFarFromTheReferenceTakesFewPartsOfATriangle) {
   for (const glm::uvec3& t : moved.triangles) faces.insert(faces.end(), {t.x, t.y, t.z});
   MovingMesh moving(volume, space, faces, 3, moved.vertices.size(), 1);
   moving.start(moved.vertices, 180, {}, nullptr);
-  const std::size_t polls = polls_of([&] {
+  return polls_of([&] {
     const MovingCoverage coverage(moving, nullptr);
     EXPECT_GT(coverage.uncovered().faces, reference.triangles.size() / 2);
   });
-  EXPECT_LT(polls, 400 * reference.triangles.size());
+}
+
+// Beyond the tolerance there is no witness, however small the parts are.
+TEST(MovingCoverage, AStartFarFromTheReferenceTakesFewPartsOfATriangle) {
+  const TriangleMesh reference = shapes::squares(30, [](const dvec3& p) { return 20.0 * p; });
+  EXPECT_LT(polls_from_afar(reference), 400 * reference.triangles.size());
+}
+
+// Each search near the hub visits all needles.
+TEST(MovingCoverage, AFanOfNeedlesFarFromTheReferenceTakesFewSearches) {
+  constexpr unsigned kNeedles = 400;
+  TriangleMesh fan{{dvec3(0)}, {}};
+  for (unsigned i = 0; i < kNeedles; ++i) {
+    const double angle = 0.01 * i / kNeedles;
+    fan.vertices.push_back(40.0 * dvec3(std::cos(angle), std::sin(angle), 0));
+    if (i > 0) fan.triangles.emplace_back(0, i, i + 1);
+  }
+  EXPECT_LT(polls_from_afar(fan), 150 * fan.triangles.size());
 }
 
 TEST(MovingCoverage, StepsAddUp) {
