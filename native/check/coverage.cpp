@@ -137,10 +137,9 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
                             glm::dot(c[2] - centre, c[2] - centre)}));
     found_beyond = found_beyond || closest.distance > provable;
     const std::size_t parts = found_beyond ? 1 + (common.nodes + closest.nodes) / kNodesOfPart : 1;
-    looked += parts;
     const double floor = (found_beyond ? kShortestPiece : kHeadroom) * limit_;
-    const bool finest =
-        longest_squared(piece) <= floor * floor || piece.cuts == kMostCuts || !may_look(looked, parts, found_beyond);
+    const bool finest = longest_squared(piece) <= floor * floor || piece.cuts == kMostCuts ||
+                        !may_look(looked += parts, parts, found_beyond);
     const bool is_beyond = closest.distance > provable + radius;
     if (is_beyond || finest) {
       if (!is_beyond) uncovered.in_part.push_back(piece);
