@@ -77,23 +77,23 @@ TEST(PatchTrial, WhatItFindsPossibleKeepsBothDirections) {
 }
 
 TEST(PatchTrial, ManyStartsSucceedWhereOneFails) {
-  // On this mesh one start fails at more than a third of the edges.
-  const TriangleMesh torus = shapes::torus(10, 0.002);
-  CertifiedMesh c(torus, torus.vertices, 0.06);
-  SurfaceSamples samples(*c.mesh, c.team);
-  PatchTrial trial(*c.mesh, samples, nullptr);
   int one = 0, many_starts = 0;
-  for (std::uint32_t e = 0; e < c.mesh->connectivity().n_edges(); ++e) {
-    const std::optional<PatchTrial::Price> price = trial.price(BoundedMesh::edge(e));
-    if (!price) continue;
-    const bool possible = trial.try_collapse(*price, {2, false, false});
-    const double reached = trial.reached();
-    const bool possible_with_many = trial.try_collapse(*price, {2, true, false});
-    EXPECT_GE(possible_with_many, possible);
-    EXPECT_TRUE(possible || trial.reached() == reached) << "it is that of the first start";
-    one += possible, many_starts += possible_with_many;
+  for (const Hostile& h : hostile(1)) {
+    CertifiedMesh c(h.mesh, h.mesh.vertices, h.tolerance);
+    SurfaceSamples samples(*c.mesh, c.team);
+    PatchTrial trial(*c.mesh, samples, nullptr);
+    for (std::uint32_t e = 0; e < c.mesh->connectivity().n_edges(); e += 3) {
+      const std::optional<PatchTrial::Price> price = trial.price(BoundedMesh::edge(e));
+      if (!price) continue;
+      const bool possible = trial.try_collapse(*price, {2, false, false});
+      const double reached = trial.reached();
+      const bool possible_with_many = trial.try_collapse(*price, {2, true, false});
+      EXPECT_GE(possible_with_many, possible);
+      EXPECT_TRUE(possible || trial.reached() == reached) << "it is that of the first start";
+      one += possible, many_starts += possible_with_many;
+    }
   }
-  EXPECT_GT(many_starts, one + 5);
+  EXPECT_GT(many_starts, one);
 }
 
 TEST(PatchTrial, MovesNoVertexThatHasToStay) {

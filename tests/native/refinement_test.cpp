@@ -85,6 +85,7 @@ TEST(Refinement, KeepsTheOneDirectionThatIsAskedFor) {
 }
 
 TEST(Refinement, SubsetKeepsPositionsBitForBit) {
+  // Of the smoother torus of the other tests fast leaves as few triangles.
   const Case c{shapes::torus(36, 0.02), glm::dmat4(1), Storage::float32, kPercent};
   Options options = thorough();
   options.placement = Options::Placement::subset;

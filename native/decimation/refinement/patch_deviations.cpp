@@ -280,23 +280,16 @@ std::optional<PatchDeviations::Term> PatchDeviations::followed(std::size_t term,
 /// beyond by a search. The search for a nearest face begins at that of terms_.
 void PatchDeviations::evaluate(bool look_around, double followed_up_to, std::vector<Term>& terms) {
   terms.clear();
+  const auto add_next = [&](const auto& search) {
+    const std::optional<Term> term = followed(terms.size(), followed_up_to);
+    terms.push_back(term ? *term : search());
+    work_ += !term;
+  };
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    if (const auto term = followed(i, followed_up_to)) {
-      terms.push_back(*term);
-      continue;
-    }
-    terms.push_back(nearest(points_[i].point, terms_[i].face, look_around));
-    ++work_;
+    add_next([&] { return nearest(points_[i].point, terms_[i].face, look_around); });
   }
   for (const auto* all : {&own_points_, &added_points_}) {
-    for (const FacePoint& p : *all) {
-      if (const auto term = followed(terms.size(), followed_up_to)) {
-        terms.push_back(*term);
-        continue;
-      }
-      terms.push_back(toward_reference(p));
-      ++work_;
-    }
+    for (const FacePoint& p : *all) add_next([&] { return toward_reference(p); });
   }
   for (const HeldPoint& p : separations_) terms.push_back(into_half_space(p));
 }
