@@ -79,7 +79,7 @@ def read(ob, settings):
     chosen = settings.placement_choice >= 0
     placement = settings.placement if chosen else automatic_placement(ob.data)
     asked = decimation.options(settings, placement, threads=1)
-    asked |= {"effort": "fast", "target_triangles": None, "max_seconds": None, "outside": settings.outside.lower()}
+    asked |= {"effort": "fast", "target_triangles": None, "max_seconds": None}
     _known[ob.name] = Known(_token(ob, settings), None, None)
     # The tolerance is that of each run.
     surface = snapshots.surface_of(ob)

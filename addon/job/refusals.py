@@ -8,7 +8,7 @@ _last = {}  # name of an object -> (label of the operation, the reason, the time
 
 
 def keep(names, label, reason):
-    """Notes that an operation on the objects of these names has changed nothing."""
+    """Remembers why an operation on the objects of these names was refused. label: the name of the operation."""
     for name in names:
         _last[name] = label, reason, datetime.datetime.now()
 

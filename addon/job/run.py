@@ -109,8 +109,9 @@ class Run:
             self.voice.report({"INFO"}, f"{self.label} was cancelled. {left}")
             return {"CANCELLED"}
         except (Refused, native.module.TolvolError) as error:
-            refusals.keep(self._names(), self.label, native.said(error))
-            self.voice.report({"ERROR"}, popup_text(native.said(error)))
+            reason = native.said(error)
+            refusals.keep(self._names(), self.label, reason)
+            self.voice.report({"ERROR"}, popup_text(reason))
             return {"CANCELLED"}
 
     def _names(self):

@@ -138,7 +138,6 @@ object. An object without a reference gets one first, as by Set Reference"""
         tolerance = tolerances.tolerance_length(self, reference.size())
         placement = automatic_placement(ob.data) if self.own_placements else self.placement
         options = decimation.options(self, placement, self.threads or preferences.threads(context))
-        options["outside"] = self.outside.lower()
         return decimation.task(ob, surface, reference, tolerance, self, options)
 
     def _prepared(self, stack, outcomes):

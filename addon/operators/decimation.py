@@ -25,7 +25,7 @@ def options(settings, placement, threads):
         "max_normal_angle": round(math.degrees(settings.max_normal_angle), 4),
         "max_seconds": settings.max_seconds or None,
         "target_triangles": settings.target_triangles if settings.use_target else None,
-        "outside": "error",
+        "outside": settings.outside.lower(),
         "threads": threads,
     }
 

@@ -201,7 +201,13 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         self.part, self.doing, self.share = "", "Comparing with Decimate", 0.0
         settings = self.ob.tolvol
         options = decimation.options(settings, automatic_placement(self.ob.data), trial.threads)
-        options |= {"two_sided": True, "effort": "fast", "target_triangles": None, "max_seconds": None}
+        options |= {
+            "two_sided": True,
+            "effort": "fast",
+            "target_triangles": None,
+            "max_seconds": None,
+            "outside": "error",
+        }
         task = Task(self.ob.name, trial.surface, trial.reference, trial.tolerance, options)
         task.uvs = mesh_io.corner_uvs(self.ob.data)
         try:

@@ -91,7 +91,7 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             chosen = settings.placement_choice >= 0
             placement = settings.placement if chosen else automatic_placement(original.data)
             asked = decimation.options(settings, placement, self.threads or preferences.threads(context))
-            asked |= {"two_sided": True, "target_triangles": None}
+            asked |= {"two_sided": True, "target_triangles": None, "outside": "error"}
             surface = snapshots.surface_of(original)
             tasks = [decimation.task(original, surface, reference, limit, settings, dict(asked)) for limit in limits]
         if self.by == "COUNT":
