@@ -33,7 +33,7 @@ constexpr double kShortest = 1.0 / 16;
 // This is local_size_x of certificate.comp.
 constexpr GLuint kGroup = 64;
 // A point with this coordinate, in the frame, is farther than any tolerance from any reference.
-constexpr float kFar = 16;
+constexpr float kTooFar = 16;
 
 /// Returns a threshold: if a squared distance in floating point is not larger, the distance is at most `limit`. The two
 /// sums, the squares and the rounding of the threshold each change it by a factor of at most 1 + 2^-23, and there is
@@ -58,7 +58,7 @@ std::vector<float> corners_to_send(const PlacedPieces& pieces, std::size_t begin
           const glm::dvec3& p = pieces.points[pieces.indices[i * static_cast<std::size_t>(pieces.corners) + corner]];
           for (int k = 0; k < 3; ++k) {
             // Larger numbers would cost precision, and GLSL promises nothing for NaN.
-            *to++ = std::abs(p[k]) <= magnitude ? static_cast<float>(p[k]) : kFar;
+            *to++ = std::abs(p[k]) <= magnitude ? static_cast<float>(p[k]) : kTooFar;
           }
         }
       }

@@ -7,7 +7,7 @@ namespace tolvol {
 namespace {
 
 // A tile has so many samples along each axis. A call can be cancelled between tiles.
-constexpr int kTile = 1024;
+constexpr int kDistanceTile = 1024;
 // Stripes follow one another at this distance, in pixels.
 constexpr float kStripe = 12;
 
@@ -32,7 +32,7 @@ Image DistanceRenderer::render(const DrawnMesh& mesh, const Camera& camera, cons
   const glm::mat4 to_clip(view.to_clip * field_->to_frame());
   bool written = false;
   return canvas_.draw(
-      r, kTile,
+      r, kDistanceTile,
       [&](const glm::vec2& first) {
         if (!std::exchange(written, true)) mesh_.write(mesh);
         field_->texture().bind(0);

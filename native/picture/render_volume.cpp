@@ -14,7 +14,7 @@ namespace tolvol {
 namespace {
 
 // A tile has so many samples along each axis. A call can be cancelled between tiles.
-constexpr int kTile = 256;
+constexpr int kVolumeTile = 256;
 // The field far from the surface has this many nodes along the longest side of its box: more nodes cost more time to
 // fill than they save in steps.
 constexpr int kFarNodes = 40;
@@ -76,7 +76,7 @@ Image VolumeRenderer::render(const DrawnMesh& mesh, const Camera& camera, const 
     program.set("surface", surface ? 1 : 0);
   };
   return canvas_.draw(
-      r, kTile,
+      r, kVolumeTile,
       [&](const glm::vec2&) {
         if (!std::exchange(written, true)) mesh_.write(mesh);
         field_->texture().bind(0);

@@ -21,7 +21,7 @@ struct Constrained {
   py::dict report;
 };
 
-PullBack::Mode to_mode(const std::string& mode) {
+PullBack::Mode pull_back_mode(const std::string& mode) {
   if (mode == "pull_back") return PullBack::Mode::pull_back;
   if (mode == "reset") return PullBack::Mode::reset;
   throw InvalidInput("mode must be \"pull_back\" or \"reset\", not \"" + mode + "\"");
@@ -37,7 +37,7 @@ Constrained constrain_arrays(const py::object& before, const py::object& after, 
   const std::vector<std::uint32_t> indices = to_faces(faces, "faces", corners);
   const StoredSpace space(to_matrix(to_world), from.storage);
   ConstrainOptions options;
-  options.mode = to_mode(mode);
+  options.mode = pull_back_mode(mode);
   options.two_sided = two_sided;
   options.outside = to_outside(outside);
   options.crossings = to_crossings(crossings);

@@ -19,7 +19,7 @@
 namespace tolvol::python {
 namespace {
 
-struct Result {
+struct Decimated {
   py::array vertices;
   py::array_t<std::int32_t> triangles, vertex_map, vertex_source, triangle_source, source_triangle;
   py::array_t<double> source_weights;
@@ -78,7 +78,7 @@ Box to_box(const std::array<std::array<double, 3>, 2>& ends) {
   return {{l[0], l[1], l[2]}, {u[0], u[1], u[2]}};
 }
 
-Result decimate_arrays(const py::object& vertices, const py::object& triangles, const Volume* volume,
+Decimated decimate_arrays(const py::object& vertices, const py::object& triangles, const Volume* volume,
                        const py::object& to_world, const std::string& placement, bool two_sided,
                        std::optional<std::int64_t> target_triangles, const py::object& locked, const py::object& shares,
                        const std::string& outside, const py::object& wedges, const std::string& effort,
@@ -132,7 +132,7 @@ Result decimate_arrays(const py::object& vertices, const py::object& triangles, 
     return_free_memory(t.size());
     seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
-  Result result;
+  Decimated result;
   result.vertices = from_vertices(r.vertices, v.storage);
   result.triangles = from_triangles(r.triangles);
   result.vertex_map = from_vector<std::int32_t>(r.vertex_map);
@@ -167,26 +167,26 @@ py::array_t<std::int32_t> wedges(const py::object& triangles, const py::object& 
 }  // namespace
 
 void bind_decimation(py::module_& module) {
-  py::class_<Result>(module, "DecimationResult", py::module_local(),
+  py::class_<Decimated>(module, "DecimationResult", py::module_local(),
                      "The mesh that decimate returns, and where each part of it came from.")
-      .def_readonly("vertices", &Result::vertices, "(k, 3) array of the input's dtype: local coordinates.")
-      .def_readonly("triangles", &Result::triangles, "(l, 3) int32: indices of `vertices`.")
-      .def_readonly("vertex_map", &Result::vertex_map,
+      .def_readonly("vertices", &Decimated::vertices, "(k, 3) array of the input's dtype: local coordinates.")
+      .def_readonly("triangles", &Decimated::triangles, "(l, 3) int32: indices of `vertices`.")
+      .def_readonly("vertex_map", &Decimated::vertex_map,
                     "(n,) int32: the result vertex that each input vertex was merged into, or -1 if no triangle uses "
                     "it.")
-      .def_readonly("vertex_source", &Result::vertex_source,
+      .def_readonly("vertex_source", &Decimated::vertex_source,
                     "(k,) int32: the input vertex that each result vertex continues. Where sheets touch, the result "
                     "vertex may be where another input vertex was, even with placement=\"subset\".")
-      .def_readonly("triangle_source", &Result::triangle_source,
+      .def_readonly("triangle_source", &Decimated::triangle_source,
                     R"doc((l,) int32: the input triangle that each result triangle continues.
 
 The corners of a result triangle are vertex_map of the corners of that input triangle, in order, unless edges around it
 were flipped, or the triangle was divided where vertices lie on it (a T-junction).)doc")
-      .def_readonly("source_triangle", &Result::source_triangle,
+      .def_readonly("source_triangle", &Decimated::source_triangle,
                     "(l, 3) int32: for each corner of the result the input triangle that its attributes are read from.")
-      .def_readonly("source_weights", &Result::source_weights,
+      .def_readonly("source_weights", &Decimated::source_weights,
                     "(l, 3, 3) float64: for each corner of the result the barycentric weights in that input triangle.")
-      .def_readonly("report", &Result::report, R"doc(A dict with these entries:
+      .def_readonly("report", &Decimated::report, R"doc(A dict with these entries:
 
 triangles_in, triangles_out : the number of triangles before and after
 seconds : the time that the call took

@@ -93,12 +93,12 @@ Doubles lattice_points(const py::object& shape, const py::object& domain) {
   return result;
 }
 
-struct Result {
+struct Deformed {
   py::array vertices;
   py::dict report;
 };
 
-DeformationOptions::Mode to_mode(const std::string& mode) {
+DeformationOptions::Mode deformation_mode(const std::string& mode) {
   if (mode == "blocked") return DeformationOptions::Mode::blocked;
   if (mode == "farthest") return DeformationOptions::Mode::farthest;
   if (mode == "pull_back") return DeformationOptions::Mode::pull_back;
@@ -130,7 +130,7 @@ py::dict make_report(const DeformationResult& r, double seconds) {
   return report;
 }
 
-Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, const py::object& faces,
+Deformed deform_arrays(const py::object& vertices, const PythonLattice& lattice, const py::object& faces,
                      const Volume* volume, const py::object& to_world, const std::string& mode, bool two_sided,
                      const std::string& outside, const std::string& crossings, std::optional<double> max_normal_angle,
                      std::optional<int> threads, Progress* progress) {
@@ -141,7 +141,7 @@ Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, c
   if (volume && faces.is_none()) throw InvalidInput("with a volume faces are needed, to be kept within it");
   const StoredSpace placed(to_matrix(to_world), v.storage);
   DeformationOptions options;
-  options.mode = to_mode(mode);
+  options.mode = deformation_mode(mode);
   options.two_sided = two_sided;
   options.outside = to_outside(outside);
   options.crossings = to_crossings(crossings);
@@ -219,9 +219,9 @@ Raises
 ------
 InvalidInput)doc");
 
-  py::class_<Result>(module, "DeformationResult", py::module_local(), "The mesh that deform returns.")
-      .def_readonly("vertices", &Result::vertices, "(n, 3) array of the input's dtype: local coordinates.")
-      .def_readonly("report", &Result::report, R"doc(A dict with these entries:
+  py::class_<Deformed>(module, "DeformationResult", py::module_local(), "The mesh that deform returns.")
+      .def_readonly("vertices", &Deformed::vertices, "(n, 3) array of the input's dtype: local coordinates.")
+      .def_readonly("report", &Deformed::report, R"doc(A dict with these entries:
 
 permitted_fraction : from 0 to 1, the share of the way at which the whole mesh is certified to be inside, and no faces
     are turned or cross that must not, found by bisection to a thousandth; 1 without a volume; None if vertices were

@@ -9,6 +9,7 @@ import argparse
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -17,6 +18,7 @@ from passes import Passes, hash_of, key_of
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build/release"
+SOURCES = set(ROOT.glob("native/**/*.cpp"))
 CLANG_TIDY = str(ROOT / "build/style/bin/clang-tidy")
 OPTIONS = ("--quiet", "--extra-arg=-Wno-unknown-warning-option")  # clang does not know some options of GCC.
 
@@ -30,36 +32,30 @@ def name_of(path):
     return str(path.relative_to(ROOT) if path.is_relative_to(ROOT) else path)
 
 
-def included():
-    """Returns the files that the compiler read for each source, itself among them, as the last build has noted them."""
-    files = {}
+def compiled():
+    """Returns {source: (options, files)} for the native sources of the last build: the options that it was compiled with,
+    and the files that the compiler read. CMake joins several sources, which are compiled as one and share these files."""
+    options = {}
+    for entry in json.loads((BUILD / "compile_commands.json").read_text()):
+        words = shlex.split(entry["command"].replace(str(ROOT), "."))
+        first = next(place for place, word in enumerate(words) if word.startswith("-"))
+        options.setdefault(Path(entry["file"]), words[first : words.index("-o")])
+    found = {}
     for block in said_by("ninja", "-C", str(BUILD), "-t", "deps").split("\n\n"):
         header, *lines = block.splitlines() or [""]
         paths = [Path(os.path.normpath(BUILD / line.strip())) for line in lines if line.startswith(" ")]
-        if header.endswith("(VALID)") and paths:
-            files.setdefault(paths[0], set()).update(paths)
-    return files
-
-
-def keys():
-    """Returns the key of a pass for each source that the last build has compiled."""
-    common = [said_by(CLANG_TIDY, "--version"), hash_of(ROOT / ".clang-tidy"), *OPTIONS]
-    commands = {}
-    for entry in json.loads((BUILD / "compile_commands.json").read_text()):
-        commands.setdefault(Path(entry["file"]), []).append(entry["command"].replace(str(ROOT), "."))
-    found = {}
-    for source, files in included().items():
-        contents = sorted((name_of(path), hash_of(path)) for path in files if path.exists())
-        found[source] = key_of(common, name_of(source), sorted(commands.get(source, [])), contents)
+        if header.endswith("(VALID)") and paths and paths[0] in options:
+            for source in SOURCES.intersection(paths):
+                found[source] = options[paths[0]], paths
     return found
 
 
-def is_passed(source):
+def is_passed(source, options):
     """Whether clang-tidy passes a source. Prints what it says."""
-    command = [CLANG_TIDY, *OPTIONS, "-p", str(BUILD), str(source)]
+    command = [CLANG_TIDY, *OPTIONS, str(source), "--", *options]
     run = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    # Its counts of warnings in system headers are of no use, nor is how far it is with a source that is compiled twice.
-    said = re.sub(r"^(\d+ warnings? generated\.|\[.* Processing file .*)\n", "", run.stdout, flags=re.MULTILINE)
+    # Its counts of warnings in system headers are of no use.
+    said = re.sub(r"^\d+ warnings? generated\.\n", "", run.stdout, flags=re.MULTILINE)
     print(said, end="")
     return run.returncode == 0 and not said.strip()
 
@@ -70,19 +66,24 @@ def main():
     parser.add_argument("count", type=int)
     parser.add_argument("--all", action="store_true")
     options = parser.parse_args()
-    passes = Passes("clang_tidy")
-    known, checked, failed = keys(), 0, []
-    sources = sorted(ROOT.glob("native/**/*.cpp"))[options.index :: options.count]
+    passes, found = Passes("clang_tidy"), compiled()
+    common = [said_by(CLANG_TIDY, "--version"), hash_of(ROOT / ".clang-tidy"), *OPTIONS]
+    sources, checked, failed = sorted(SOURCES)[options.index :: options.count], 0, []
     for source in sources:
-        key = known.get(source)
-        if options.all or not key or passes.text(key) is None:
+        if source not in found:
+            failed.append(name_of(source))
+            print(f"{BUILD} has not compiled it\n{name_of(source)}: FAILED", flush=True)
+            continue
+        compiled_with, files = found[source]
+        contents = sorted((name_of(path), hash_of(path)) for path in files if path.exists())
+        key = key_of(common, name_of(source), compiled_with, contents)  # of its pass
+        if options.all or passes.text(key) is None:
             checked += 1
-            if not is_passed(source):
+            if not is_passed(source, compiled_with):
                 failed.append(name_of(source))
                 print(f"{name_of(source)}: FAILED", flush=True)
                 continue
-            if key:
-                passes.note(key)
+            passes.note(key)
         print(f"{name_of(source)}: ok", flush=True)
     if options.index == 0:
         passes.forget_old()
