@@ -73,13 +73,15 @@ Coverage::Coverage(const TriangleMesh& reference, double limit, std::size_t elem
     : reference_(&reference),
       limit_(limit),
       limit2_(limit * limit),
-      lists_(element_count),
+      pieces_(element_count),
+      distance_(element_count, kNoPiece),
       budget_of_first_(kBudgetOfFirst + kBudgetOfElement * element_count),
       budget_of_beyond_(budget_of_first_),
       split_into_(reference.triangles.size()) {}
 
 void Coverage::set_witness(std::uint32_t element, std::uint32_t triangle) {
-  lists_[element].pieces.push_back(whole(triangle));
+  pieces_[element].push_back(whole(triangle));
+  distance_[element] = std::max(distance_[element], 0.0);
 }
 
 Coverage::Uncovered Coverage::find_witnesses(std::span<const std::uint32_t> triangles, const TriangleMesh& mesh,
@@ -111,9 +113,8 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
       hint = witness;
       const std::uint32_t element = ids[witness];
       if (element == kNone) return;
-      List& list = lists_[element];
-      list.distance = std::max(list.distance, distance);
-      list.pieces.push_back(piece);
+      pieces_[element].push_back(piece);
+      distance_[element] = std::max(distance_[element], distance);
       if (piece.cuts > 0) ++split_into_[triangle];
     };
     const Hierarchy::Common common = hierarchy.common(c, provable, -1, hint);
@@ -159,7 +160,7 @@ bool Coverage::may_look(std::size_t looked, std::size_t parts, bool found_beyond
 }
 
 void Coverage::sample(std::uint32_t element, std::size_t stride, std::vector<Sample>& out) const {
-  const PieceList& pieces = lists_[element].pieces;
+  const PieceList& pieces = pieces_[element];
   for (std::size_t i = 0; i < pieces.size(); i += stride) {
     const Part piece = pieces.at(i, *reference_);
     const auto& [a, b, c] = piece.corners;
@@ -168,7 +169,7 @@ void Coverage::sample(std::uint32_t element, std::size_t stride, std::vector<Sam
 }
 
 void Coverage::points(std::uint32_t element, std::size_t stride, std::vector<glm::dvec3>& out) const {
-  const PieceList& pieces = lists_[element].pieces;
+  const PieceList& pieces = pieces_[element];
   for (std::size_t i = 0; i < pieces.size(); i += stride) {
     const Part piece = pieces.at(i, *reference_);
     const auto& [a, b, c] = piece.corners;
@@ -248,19 +249,15 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   bool settled = true;
   for (const Element& e : elements) {
     poll_at(trial.candidates_.size() + 1);  // Most changes have a few elements and need no poll.
-    const List& list = lists_[e.id];
-    const double distance = list.pieces.empty() ? 0 : list.distance + e.moved;
-    const bool keeps = e.moved == 0 || distance <= limit_;
+    const bool keeps = e.moved == 0 || settles(e.id, e.moved);
     settled &= keeps;
-    trial.candidates_.push_back({e.id, {}, keeps ? distance : 0, !keeps});
+    trial.candidates_.push_back({e.id, {}, keeps ? distance_after(e.id, e.moved) : kNoPiece, !keeps});
   }
   for (const Removed& r : removed) {
-    const List& list = lists_[r.id];
-    const double distance = list.distance + r.moved;
-    const bool whole = list.pieces.empty() || distance <= limit_;
+    const bool whole = settles(r.id, r.moved);
     settled &= whole;
-    if (whole && !list.pieces.empty())
-      trial.candidates_[r.successor].distance = std::max(trial.candidates_[r.successor].distance, distance);
+    double& distance = trial.candidates_[r.successor].distance;
+    if (whole) distance = std::max(distance, distance_after(r.id, r.moved));
     trial.removed_lists_.push_back({r.id, r.successor, whole});
   }
   if (settled) return true;
@@ -272,7 +269,7 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   thread_local std::vector<std::uint32_t> gathered;  // has a count for each triangle of the reference, 0 between calls
   if (gathered.size() < split_into_.size()) gathered.resize(split_into_.size(), 0);
   const auto for_each_split = [&](auto&& call) {
-    trial.for_each_replaced_part(lists_, [&](const Part& piece) { call(gathered[piece.of]); });
+    trial.for_each_replaced_part(pieces_, [&](const Part& piece) { call(gathered[piece.of]); });
   };
   // The counts are cleared even if the search throws.
   const struct Clear {
@@ -319,13 +316,13 @@ bool Coverage::place_all(Trial& trial, std::vector<std::uint32_t>& gathered) con
   const bool goes_on = trial.most_failures_ > 0;
   // Pieces that lose their element are the likeliest to fail.
   for (const Trial::RemovedList& h : trial.removed_lists_) {
-    if (!h.whole && !place_list(lists_[h.id].pieces, h.successor) && !goes_on) return false;
+    if (!h.whole && !place_list(pieces_[h.id], h.successor) && !goes_on) return false;
   }
   const auto count = static_cast<std::uint32_t>(trial.candidates_.size());
   for (std::uint32_t k = 0; k < count; ++k) {
     const std::uint32_t i = (trial.failed_last_ + k) % count;
     if (!trial.candidates_[i].replaced) continue;
-    if (!place_list(lists_[trial.candidates_[i].id].pieces, i) && !goes_on) {
+    if (!place_list(pieces_[trial.candidates_[i].id], i) && !goes_on) {
       trial.failed_last_ = i;
       return false;
     }
@@ -350,10 +347,10 @@ bool Coverage::place_in_blocks(Trial& trial, std::vector<std::uint32_t>& gathere
     });
   };
   for (const Trial::RemovedList& h : trial.removed_lists_) {
-    if (!h.whole) add(lists_[h.id].pieces, h.successor);
+    if (!h.whole) add(pieces_[h.id], h.successor);
   }
   for (std::uint32_t i = 0; i < trial.candidates_.size(); ++i) {
-    if (trial.candidates_[i].replaced) add(lists_[trial.candidates_[i].id].pieces, i);
+    if (trial.candidates_[i].replaced) add(pieces_[trial.candidates_[i].id], i);
   }
   const std::size_t count = lost.size();
   lost.push_back({0, pieces.size()});
@@ -385,22 +382,22 @@ void Coverage::commit(const Trial& trial) {
   const PieceList& moved = trial.placing_.moved;
   // Counts grow before they shrink, so that no count is ever less than the number of pieces.
   for (const Part& part : moved.parts()) split_into_[part.of].fetch_add(1, std::memory_order_relaxed);
-  trial.for_each_replaced_part(lists_,
+  trial.for_each_replaced_part(pieces_,
                                [&](const Part& part) { split_into_[part.of].fetch_sub(1, std::memory_order_relaxed); });
   for (const Trial::Candidate& c : trial.candidates_) {
-    if (c.replaced) lists_[c.id].pieces.clear();
-    lists_[c.id].distance = c.distance;
+    if (c.replaced) pieces_[c.id].clear();
+    distance_[c.id] = c.distance;
   }
   for (const Trial::RemovedList& h : trial.removed_lists_) {
     // This frees the memory of the element, which is gone; clear() would keep it.
-    const PieceList pieces = std::exchange(lists_[h.id].pieces, {});
-    if (h.whole) lists_[trial.candidates_[h.successor].id].pieces.append(pieces);
+    const PieceList pieces = std::exchange(pieces_[h.id], {});
+    if (h.whole) pieces_[trial.candidates_[h.successor].id].append(pieces);
   }
   for (std::size_t i = 0; i < moved.size(); ++i) {
     const Goal& goal = trial.placing_.goals[i];
-    List& to = lists_[trial.candidates_[goal.element].id];
-    to.pieces.push_back(moved.at(i, *reference_));
-    to.distance = std::max(to.distance, goal.distance);
+    const std::uint32_t to = trial.candidates_[goal.element].id;
+    pieces_[to].push_back(moved.at(i, *reference_));
+    distance_[to] = std::max(distance_[to], goal.distance);
   }
 }
 

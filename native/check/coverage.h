@@ -13,6 +13,7 @@
 #include <atomic>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -72,17 +73,13 @@ class Coverage {
 
   /// Adds the corners and centroids of every `stride`-th piece of the element.
   void points(std::uint32_t element, std::size_t stride, std::vector<glm::dvec3>& out) const;
-  std::size_t piece_count(std::uint32_t element) const { return lists_[element].pieces.size(); }
+  std::size_t piece_count(std::uint32_t element) const { return pieces_[element].size(); }
 
   /// Tells whether the element is still the witness of all its pieces, without a look at them, when its points move by
   /// at most `moved`.
-  bool settles(std::uint32_t element, double moved) const {
-    return lists_[element].pieces.empty() || lists_[element].distance + moved <= limit_;
-  }
+  bool settles(std::uint32_t element, double moved) const { return distance_after(element, moved) <= limit_; }
   /// Carries out such a motion.
-  void carry(std::uint32_t element, double moved) {
-    if (!lists_[element].pieces.empty()) lists_[element].distance += moved;
-  }
+  void carry(std::uint32_t element, double moved) { distance_[element] = distance_after(element, moved); }
 
   struct Failure;
   class Trial;
@@ -93,16 +90,18 @@ class Coverage {
   void commit(const Trial& trial);
 
  private:
-  struct List {
-    PieceList pieces;
-    double distance = 0;  ///< no piece is farther than this from the element
-  };
+  /// The distance of an element without pieces.
+  static constexpr double kNoPiece = -std::numeric_limits<double>::infinity();
   /// Where a piece goes, and how far it is from that element at most.
   struct Goal {
     std::uint32_t element;
     double distance;
   };
 
+  /// The distance of an element whose points move by at most `moved`, which may be infinite.
+  double distance_after(std::uint32_t element, double moved) const {
+    return distance_[element] == kNoPiece ? kNoPiece : distance_[element] + moved;
+  }
   Part whole(std::uint32_t triangle) const { return PieceList::whole(triangle, *reference_); }
   void find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mesh, const Hierarchy& hierarchy,
                          std::span<const std::uint32_t> ids, double provable, Uncovered& uncovered);
@@ -117,7 +116,8 @@ class Coverage {
 
   const TriangleMesh* reference_;
   double limit_, limit2_;
-  std::vector<List> lists_;
+  std::vector<PieceList> pieces_;  ///< of each element
+  std::vector<double> distance_;   ///< No piece of the element is farther than this from it.
   /// The number of parts that find_witnesses() may still look at, when a triangle has taken its own share.
   std::size_t budget_of_first_;
   std::size_t budget_of_beyond_;  ///< The same for triangles with a point beyond the tolerance.
@@ -165,7 +165,7 @@ class Coverage::Trial {
   struct Candidate {
     std::uint32_t id;
     WitnessTriangle witness;
-    double distance;  ///< no piece that it keeps is farther
+    double distance;  ///< no piece that it keeps is farther; kNoPiece if it keeps none
     bool replaced;    ///< tells whether its own pieces are placed anew
   };
   struct RemovedList {
@@ -174,12 +174,12 @@ class Coverage::Trial {
   };
   /// Calls call(piece) for all pieces that the change places anew and that are no whole triangles.
   template <class Call>
-  void for_each_replaced_part(const std::vector<List>& lists, Call&& call) const {
+  void for_each_replaced_part(const std::vector<PieceList>& pieces, Call&& call) const {
     for (const RemovedList& h : removed_lists_) {
-      if (!h.whole) std::ranges::for_each(lists[h.id].pieces.parts(), call);
+      if (!h.whole) std::ranges::for_each(pieces[h.id].parts(), call);
     }
     for (const Candidate& c : candidates_) {
-      if (c.replaced) std::ranges::for_each(lists[c.id].pieces.parts(), call);
+      if (c.replaced) std::ranges::for_each(pieces[c.id].parts(), call);
     }
   }
 

@@ -105,12 +105,11 @@ void MovingCoverage::renew() {
   count_pieces();
 }
 
-/// How far a point of the element moves from the state to the trial at most.
-double MovingCoverage::moved(const Layer& layer, std::uint32_t element) const {
-  const auto of_face = static_cast<std::uint32_t>(layer.triangles.size());
-  const std::span<const std::uint32_t> corners = mesh_->corners_of(element / of_face);
+/// How far a point of a triangle of the face moves from the state to the trial at most.
+double MovingCoverage::moved(std::uint32_t face, const PieceTriangle& triangle) const {
+  const std::span<const std::uint32_t> corners = mesh_->corners_of(face);
   double step = 0;
-  for (const std::uint8_t k : layer.triangles[element % of_face]) step = std::max(step, mesh_->step(corners[k]));
+  for (const std::uint8_t k : triangle) step = std::max(step, mesh_->step(corners[k]));
   return step * (1 + kInflate);
 }
 
@@ -151,8 +150,8 @@ std::vector<std::uint32_t> MovingCoverage::unsettled(const Layer& layer, std::sp
   std::vector<std::uint8_t> chosen(faces.size(), 0);  // Threads would share bits.
   parallel_for(faces.size(), kManyAtOnce, mesh_->threads(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      for (std::uint32_t e = of_face * faces[i]; e < of_face * (faces[i] + 1); ++e) {
-        if (!layer.coverage.settles(e, moved(layer, e))) chosen[i] = 1;
+      for (std::uint32_t k = 0; k < of_face; ++k) {
+        if (!layer.coverage.settles(of_face * faces[i] + k, moved(faces[i], layer.triangles[k]))) chosen[i] = 1;
       }
     }
   });
@@ -188,7 +187,7 @@ std::vector<std::uint32_t> MovingCoverage::failing(Layer& layer, std::span<const
       const auto& [a, b, c] = layer.triangles[k];
       const std::uint32_t element = of_face * f + k;
       const double by =
-          chosen == Chosen::are_replaced ? std::numeric_limits<double>::infinity() : moved(layer, element);
+          chosen == Chosen::are_replaced ? std::numeric_limits<double>::infinity() : moved(f, layer.triangles[k]);
       layer.elements.push_back(
           {element, {mesh_->trial(corners[a]), mesh_->trial(corners[b]), mesh_->trial(corners[c])}, loses ? by : 0});
     }
@@ -209,8 +208,6 @@ std::vector<std::uint32_t> MovingCoverage::failing(Layer& layer, std::span<const
 void MovingCoverage::accept(std::span<const std::uint32_t> faces) {
   for (Layer& layer : layers_) {
     const auto of_face = static_cast<std::uint32_t>(layer.triangles.size());
-    std::vector<bool> is_tried(mesh_->face_count(), false);
-    for (const Coverage::Element& e : layer.elements) is_tried[e.id / of_face] = true;
     const auto count = [&] {
       std::size_t pieces = 0;
       for (const Coverage::Element& e : layer.elements) pieces += layer.coverage.piece_count(e.id);
@@ -219,11 +216,15 @@ void MovingCoverage::accept(std::span<const std::uint32_t> faces) {
     pieces_ -= count();
     layer.coverage.commit(layer.trial);
     pieces_ += count();
-    for (const std::uint32_t f : faces) {
-      for (std::uint32_t e = of_face * f; !is_tried[f] && e < of_face * (f + 1); ++e) {
-        layer.coverage.carry(e, moved(layer, e));
+    std::vector<bool> is_tried(layer.elements.empty() ? 0 : mesh_->face_count(), false);
+    for (const Coverage::Element& e : layer.elements) is_tried[e.id / of_face] = true;
+    parallel_for(faces.size(), kManyAtOnce, mesh_->threads(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const std::uint32_t f = faces[i];
+        if (!is_tried.empty() && is_tried[f]) continue;
+        for (std::uint32_t k = 0; k < of_face; ++k) layer.coverage.carry(of_face * f + k, moved(f, layer.triangles[k]));
       }
-    }
+    });
   }
 }
 

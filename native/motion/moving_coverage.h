@@ -55,7 +55,7 @@ class MovingCoverage {
     std::vector<Coverage::Element> elements;  ///< of the last change that was tried
   };
 
-  double moved(const Layer& layer, std::uint32_t element) const;
+  double moved(std::uint32_t face, const PieceTriangle& triangle) const;
   std::vector<std::uint32_t> unsettled(const Layer& layer, std::span<const std::uint32_t> faces) const;
   /// The faces that may lose pieces, and whether their neighbours may lose pieces as well.
   enum class Neighbours { lose_pieces, only_take_pieces };

@@ -12,6 +12,7 @@
 
 #include <algorithm>
 
+#include "base/call.h"
 #include "check/input_checks.h"
 #include "geometry/triangle_mesh.h"
 #include "motion/moving_coverage.h"
@@ -61,6 +62,7 @@ std::vector<std::uint32_t> PullBack::replace_faces(std::span<const std::uint32_t
   }
   if (refused.empty() && coverage_) refused = coverage_->failing_replaced(faces);
   if (!refused.empty()) return refused;
+  const Call::Within uninterrupted(nullptr);
   if (coverage_) coverage_->accept(faces);
   mesh_.accept({}, faces);
   if (crossings_) crossings_->restart();
@@ -121,6 +123,7 @@ PullBack::Result PullBack::finish(const Wish& wish, Mode mode, Progress* progres
     result.factors[i] = 0, result.reached[i] = before[i];
     ++result.held_back;
   }
+  const Call::Within uninterrupted(nullptr);
   if (coverage_) coverage_->accept(moving.faces);
   mesh_.accept(vertices, moving.faces);
   if (crossings_) crossings_->accept(vertices);

@@ -199,7 +199,13 @@ TEST(MovingCrossings, ACancelInTheMiddleKeepsTheState) {
     return correction;
   }();
   ASSERT_GT(polls, 50u);
+  std::vector<std::size_t> cancels;
   for (std::size_t last = 1; last < polls; last += std::max<std::size_t>(1, polls / (kSanitized ? 10 : 40))) {
+    cancels.push_back(last);
+  }
+  // The last polls are those nearest to where the state changes.
+  for (std::size_t last = polls - 10; last <= polls; ++last) cancels.push_back(last);
+  for (const std::size_t last : cancels) {
     Guard guard = made();
     {
       const Counted cancelled(last);
