@@ -129,6 +129,20 @@ std::vector<std::uint32_t> MovingCoverage::still_failing(std::span<const std::ui
   return {};
 }
 
+std::vector<std::uint32_t> MovingCoverage::failing_around(std::span<const std::uint32_t> vertices) {
+  // The pieces of a face go to faces that share a corner with it.
+  std::vector<std::uint32_t> faces = mesh_->faces_around(corners_of(mesh_->faces_around(vertices)));
+  std::ranges::sort(faces);
+  std::vector<std::uint32_t> all;
+  for (Layer& layer : layers_) {
+    const std::vector<std::uint32_t> failed = failing(layer, unsettled(layer, faces), Neighbours::only_take_pieces);
+    all.insert(all.end(), failed.begin(), failed.end());
+  }
+  std::ranges::sort(all);
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  return all;
+}
+
 std::vector<std::uint32_t> MovingCoverage::failing_replaced(std::span<const std::uint32_t> faces) {
   std::vector<std::uint32_t> nearest;
   std::size_t looked_at = 0;
@@ -162,17 +176,21 @@ std::vector<std::uint32_t> MovingCoverage::unsettled(const Layer& layer, std::sp
   return result;
 }
 
-/// Tries to find witnesses for the pieces of these faces among all faces around them.
-std::vector<std::uint32_t> MovingCoverage::failing(Layer& layer, std::span<const std::uint32_t> faces,
-                                                   Neighbours neighbours, Chosen chosen) {
-  const auto of_face = static_cast<std::uint32_t>(layer.triangles.size());
+std::vector<std::uint32_t> MovingCoverage::corners_of(std::span<const std::uint32_t> faces) const {
   std::vector<std::uint32_t> vertices;
   for (std::size_t i = 0; i < faces.size(); ++i) {
     poll_at(i + 1);  // A few faces need no poll.
     const std::span<const std::uint32_t> corners = mesh_->corners_of(faces[i]);
     vertices.insert(vertices.end(), corners.begin(), corners.end());
   }
-  std::vector<std::uint32_t> around = mesh_->faces_around(vertices);
+  return vertices;
+}
+
+/// Tries to find witnesses for the pieces of these faces among all faces around them.
+std::vector<std::uint32_t> MovingCoverage::failing(Layer& layer, std::span<const std::uint32_t> faces,
+                                                   Neighbours neighbours, Chosen chosen) {
+  const auto of_face = static_cast<std::uint32_t>(layer.triangles.size());
+  std::vector<std::uint32_t> around = mesh_->faces_around(corners_of(faces));
   std::size_t compared = 0;
   std::sort(around.begin(), around.end(), [&](std::uint32_t a, std::uint32_t b) {
     poll_at(++compared);

@@ -32,6 +32,9 @@ class MovingCoverage {
   std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces);
   /// Takes another look at faces that failing() returned: which of them fail still? It proves nothing of other faces.
   std::vector<std::uint32_t> still_failing(std::span<const std::uint32_t> failed);
+  /// The same as failing(), if no face failed before these vertices went elsewhere, for all triangulations together: it
+  /// looks only at faces whose pieces might lose a witness by that. It proves nothing: failing() has the last word.
+  std::vector<std::uint32_t> failing_around(std::span<const std::uint32_t> vertices);
   /// Returns faces of `faces`, whose corners are others now, whose pieces would have no witness in the state, which is
   /// on trial, and those that have been nearest to an uncovered part of the reference since the start; none if there is
   /// neither. accept() makes the faces part of the state then.
@@ -63,6 +66,7 @@ class MovingCoverage {
   enum class Chosen { move, are_replaced };
   std::vector<std::uint32_t> failing(Layer& layer, std::span<const std::uint32_t> faces, Neighbours neighbours,
                                      Chosen chosen = Chosen::move);
+  std::vector<std::uint32_t> corners_of(std::span<const std::uint32_t> faces) const;
   /// Witnesses of the state, the faces of the reference that have none, and the vertices and faces nearest to these.
   struct Found {
     std::vector<Layer> layers;

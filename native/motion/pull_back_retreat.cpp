@@ -40,7 +40,9 @@ void PullBack::back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Pr
   if (crossings_) start_crossings(held, wish);
   // Crossings are looked for among the faces whose corners have moved since they were last.
   std::vector<std::uint32_t> changed, lost, untested = wish.moving.faces, since, again;
-  bool is_renewed = false;
+  // Witnesses are sought for all faces at first and at last, and for those around what went back in between.
+  std::vector<std::uint32_t> went_back;
+  bool is_sought = false, is_renewed = false;
   std::size_t rounds = 0;
   if (!next_twin_.empty()) hold_twins(wish, wish.moving.vertices, held, changed);
   for (;;) {
@@ -48,7 +50,11 @@ void PullBack::back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Pr
     std::vector<std::uint32_t> failed = mesh_.failing(mesh_.faces_around(changed), progress);
     if (failed.empty() && coverage_) {
       if (!lost.empty()) lost = coverage_->still_failing(lost);
-      if (lost.empty()) lost = coverage_->failing(wish.moving.faces);
+      if (lost.empty() && is_sought) {
+        lost = coverage_->failing_around(went_back);
+        went_back.clear();
+      }
+      if (lost.empty()) lost = coverage_->failing(wish.moving.faces), is_sought = true;
       if (!lost.empty() && !is_renewed && coverage_->is_worn()) {
         is_renewed = true;
         coverage_->renew();
@@ -90,6 +96,7 @@ void PullBack::back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Pr
       retreat(h, is_hasty ? Mode::reset : mode, cross ? kRise : little(h), is_tangled);
     }
     if (!next_twin_.empty()) hold_twins(wish, std::vector(changed), held, changed);
+    if (coverage_) went_back.insert(went_back.end(), changed.begin(), changed.end());
     if (crossings_) since.insert(since.end(), changed.begin(), changed.end());
   }
 }
