@@ -77,9 +77,9 @@ struct Ordered {
 
 }  // namespace
 
-TriangleCertificate::TriangleCertificate(const std::vector<WitnessTriangle>& reference, const DistanceGrid& grid,
+TriangleCertificate::TriangleCertificate(const Witnesses& reference, const DistanceGrid& grid,
                                          const Hierarchy& hierarchy, double limit, double beyond)
-    : reference_(&reference),
+    : reference_(reference),
       grid_(&grid),
       hierarchy_(&hierarchy),
       limit_(limit),
@@ -96,7 +96,7 @@ TriangleCertificate::PointBound TriangleCertificate::point_bound(const glm::dvec
   FourPoints points;
   points.set(p, p, p, p);
   double d2[4];
-  witness_distances((*reference_)[triangle], points, d2);
+  witness_distances(reference_[triangle], points, d2);
   const double guessed = std::sqrt(d2[0]);
   if (guessed <= limit_) return {guessed, triangle};
   // The triangle of the nearest node need not be that of the point, least of all where the grid is coarse.
@@ -133,7 +133,7 @@ std::optional<glm::dvec3> TriangleCertificate::nearby_point(const glm::dvec3& p)
         std::find(seen.begin(), seen.begin() + count, triangle) != seen.begin() + count)
       continue;
     seen[count++] = triangle;
-    const WitnessTriangle& t = (*reference_)[triangle];
+    const WitnessTriangle t = reference_[triangle];
     const ClosestPoint q = closest_point(p, t.a, t.a + t.ab, t.a + t.ac);
     if (q.distance_squared < nearest2) nearest2 = q.distance_squared, nearest = q.point;
   }
@@ -144,7 +144,7 @@ std::optional<glm::dvec3> TriangleCertificate::nearest_point(const glm::dvec3& p
                                                              const Facing* facing) const {
   const Hierarchy::Nearest nearest = facing ? facing->nearest(*hierarchy_, p, radius) : hierarchy_->nearest(p, radius);
   if (nearest.triangle == Hierarchy::kNone) return std::nullopt;
-  const WitnessTriangle& t = (*reference_)[nearest.triangle];
+  const WitnessTriangle t = reference_[nearest.triangle];
   return closest_point(p, t.a, t.a + t.ab, t.a + t.ac).point;
 }
 
@@ -153,7 +153,7 @@ bool TriangleCertificate::is_open(const glm::dvec3& p, const Facing* facing, con
   bool is_open = true;
   const auto visit = [&](std::uint32_t triangle) {
     if (facing && !facing->admits(triangle)) return true;
-    const WitnessTriangle& t = (*reference_)[triangle];
+    const WitnessTriangle t = reference_[triangle];
     is_open = !(closest_point(p, t.a, t.a + t.ab, t.a + t.ac).distance_squared <= radius * radius);
     return is_open;
   };
@@ -199,7 +199,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
   thread_local NearTriangles around;
   queue.assign(1, {{corners[0], corners[1], corners[2]}});
   const double radius = kProve ? beyond_ : limit_;
-  around.begin(*reference_, *hierarchy_, radius, facing, steps);
+  around.begin(reference_, *hierarchy_, radius, facing, steps);
   Verdict result = Verdict::inside;
   double farthest2 = 0;  // the largest squared distance of the parts proved so far
   std::uint32_t hint = hints.x;
@@ -228,7 +228,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
       tried[tries++] = triangle;
       if (facing && !facing->admits(triangle)) return false;
       double d2[4];
-      witness_distances((*reference_)[triangle], points, d2);
+      witness_distances(reference_[triangle], points, d2);
       if (d2[3] < centre2) centre2 = d2[3], below = triangle;
       // A comparison with NaN is false, so that NaN is not covered.
       if (d2[0] <= limit2_ && d2[1] <= limit2_ && d2[2] <= limit2_) {
@@ -244,7 +244,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
     if (kSearch != Search::quick && facing) {
       covers = [&](std::uint32_t triangle) {
         double d2[4];
-        witness_distances((*reference_)[triangle], points, d2);
+        witness_distances(reference_[triangle], points, d2);
         return d2[0] <= limit2_ && d2[1] <= limit2_ && d2[2] <= limit2_;
       };
     }
@@ -283,9 +283,9 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
       continue;
     }
     const auto cut_along = [&](std::uint32_t triangle) {
-      return cut(part, (*reference_)[triangle], kWorthCutting * limit_, queue);
+      return cut(part, reference_[triangle], kWorthCutting * limit_, queue);
     };
-    const WitnessTriangle& t = (*reference_)[below];
+    const WitnessTriangle t = reference_[below];
     // If the triangles are smaller than the tolerance, a cut along an edge of one of them hardly shortens a long part.
     const bool long_over_small =
         longest2 > kLong * kLong * limit2_ && std::max(squared_length(t.ab), squared_length(t.ac)) <= limit2_;
@@ -351,7 +351,7 @@ Verdict TriangleCertificate::verdict(const glm::dvec3 (&corners)[3], const glm::
   const Verdict found = search<Search::verdict>(ordered.corners, ordered.hints, facing, farthest);
   const auto& [a, b, c] = ordered.corners;
   if (found != Verdict::unproved || b != c || facing) return found;
-  return covers_segment(*reference_, *hierarchy_, a, b, limit_) ? Verdict::inside : Verdict::unproved;
+  return covers_segment(reference_, *hierarchy_, a, b, limit_) ? Verdict::inside : Verdict::unproved;
 }
 
 std::vector<Verdict> Certificate::verdicts(const PlacedPieces& pieces, const Options& options) const {

@@ -41,8 +41,8 @@ class TriangleCertificate {
  public:
   /// `limit` is the provable distance (ToleranceVolume::provable()) and `beyond` the refutable one, in the frame. Keeps
   /// references to the other arguments. With a grid without nodes the hierarchy finds all triangles.
-  TriangleCertificate(const std::vector<WitnessTriangle>& reference, const DistanceGrid& grid,
-                      const Hierarchy& hierarchy, double limit, double beyond);
+  TriangleCertificate(const Witnesses& reference, const DistanceGrid& grid, const Hierarchy& hierarchy, double limit,
+                      double beyond);
 
   static constexpr double kUnproved = std::numeric_limits<double>::infinity();
 
@@ -108,7 +108,7 @@ class TriangleCertificate {
   double limit() const { return limit_; }
   /// Returns a certificate with `share`, 0 to 1, of the provable distance.
   TriangleCertificate narrowed(double share) const {
-    return {*reference_, *grid_, *hierarchy_, share * limit_, beyond_};
+    return {reference_, *grid_, *hierarchy_, share * limit_, beyond_};
   }
 
  private:
@@ -124,7 +124,7 @@ class TriangleCertificate {
   Verdict search(const glm::dvec3 (&corners)[3], const glm::uvec3& hints, Facing* facing, double& farthest,
                  glm::dvec3* open = nullptr, std::size_t* steps = nullptr) const;
 
-  const std::vector<WitnessTriangle>* reference_;
+  Witnesses reference_;
   const DistanceGrid* grid_;
   const Hierarchy* hierarchy_;
   double limit_, limit2_, beyond_;

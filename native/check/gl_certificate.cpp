@@ -71,12 +71,13 @@ std::vector<float> corners_to_send(const PlacedPieces& pieces, std::size_t begin
 
 GlCertificate::GlCertificate(const ToleranceVolume& volume) : ToleranceCheck(volume), renderer_(gl::renderer().name()) {
   const std::vector<std::uint32_t>& nodes = volume.grid().triangle;
-  const std::vector<WitnessTriangle>& reference = volume.witnesses();
+  const Witnesses reference = volume.witnesses();
   const auto coordinates = [&](glm::dvec3 WitnessTriangle::*member) {
     std::vector<float> values;
     values.reserve(3 * reference.size());
-    for (const WitnessTriangle& t : reference) {
-      poll_at(values.size());
+    for (std::size_t i = 0; i < reference.size(); ++i) {
+      poll_at(i);
+      const WitnessTriangle t = reference[i];
       for (int k = 0; k < 3; ++k) values.push_back(static_cast<float>((t.*member)[k]));
     }
     return values;

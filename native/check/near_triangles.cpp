@@ -29,9 +29,9 @@ constexpr double kNothing = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-void NearTriangles::begin(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, double radius,
-                          const Facing* facing, std::size_t* steps) {
-  triangles_ = &triangles, hierarchy_ = &hierarchy, facing_ = facing, steps_ = steps, radius_ = radius;
+void NearTriangles::begin(const Witnesses& triangles, const Hierarchy& hierarchy, double radius, const Facing* facing,
+                          std::size_t* steps) {
+  triangles_ = triangles, hierarchy_ = &hierarchy, facing_ = facing, steps_ = steps, radius_ = radius;
   searches_ = nodes_ = 0, too_far_ = kNothing;
   pool_.clear();
   lists_.assign(1, {0, 0});
@@ -75,7 +75,7 @@ double NearTriangles::reach(const Part& part, const glm::dvec3& centre) const {
 }
 
 void NearTriangles::look_at(std::uint32_t triangle, const glm::dvec3& centre, double reach2) {
-  const WitnessTriangle& t = (*triangles_)[triangle];
+  const WitnessTriangle t = (*triangles_)[triangle];
   const glm::dvec3 b = t.a + t.ab, c = t.a + t.ac;
   if (is_beyond(centre, t.a, b, c, reach2)) return;
   const double squared = closest_point(centre, t.a, b, c).distance_squared;

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <vector>
 
 #include "check/facing.h"
@@ -23,8 +24,8 @@ class NearTriangles {
   /// as large as in a frame. `radius` is the largest radius that nearest() will be asked for. If `facing` is not null,
   /// there are only the triangles that it admits. If `steps` is not null, nearest() adds its steps
   /// to it: one for a node that it visits, and one for four triangles of a list.
-  void begin(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, double radius,
-             const Facing* facing = nullptr, std::size_t* steps = nullptr);
+  void begin(const Witnesses& triangles, const Hierarchy& hierarchy, double radius, const Facing* facing = nullptr,
+             std::size_t* steps = nullptr);
 
   /// Returns exactly hierarchy.nearest(centre, radius, hint).triangle, or that of facing->nearest(), for the centre of
   /// a part. Writes part.of, which names the list of triangles near the part, and which its parts inherit. `enough` is
@@ -46,7 +47,7 @@ class NearTriangles {
   void look_at(std::uint32_t triangle, const glm::dvec3& centre, double reach2);
   std::uint32_t search(const glm::dvec3& centre, double radius, std::uint32_t hint, const FacingRule::Enough& enough);
 
-  const std::vector<WitnessTriangle>* triangles_ = nullptr;
+  std::optional<Witnesses> triangles_;
   const Hierarchy* hierarchy_ = nullptr;
   const Facing* facing_ = nullptr;
   std::size_t* steps_ = nullptr;

@@ -17,8 +17,8 @@ constexpr int kHalvings = 60;
 
 }  // namespace
 
-bool covers_segment(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, const glm::dvec3& a,
-                    const glm::dvec3& b, double limit) {
+bool covers_segment(const Witnesses& triangles, const Hierarchy& hierarchy, const glm::dvec3& a, const glm::dvec3& b,
+                    double limit) {
   const double reach = limit + kCoverShare * witness_error(1 + 2 * limit), reach2 = reach * reach;
   // A point is placed from the nearer end, which errs less and is exact at both ends.
   const auto at = [&](double t) { return t <= 0.5 ? a + t * (b - a) : b + (1 - t) * (a - b); };
@@ -32,7 +32,7 @@ bool covers_segment(const std::vector<WitnessTriangle>& triangles, const Hierarc
     double end = -1;
     // The search computes distances in another way. The radius is a little larger, so that it misses no triangle.
     hierarchy.for_each_within(at(begin), reach * (1 + 1e-12), [&](std::uint32_t i) {
-      const WitnessTriangle& triangle = triangles[i];
+      const WitnessTriangle triangle = triangles[i];
       if ((end >= 0 && !covered(triangle, end)) || !covered(triangle, begin)) return true;
       if (covered(triangle, 1)) {
         end = 1;

@@ -25,7 +25,7 @@ inline constexpr double kCoverShare = 0.75;
 /// segment, so that each triangle covers one interval. The search follows, of the intervals that cover a point, the one
 /// that reaches farthest to its end, and so on. No other cover has fewer intervals. Each interval costs about 0.1 us
 /// for each triangle near its beginning.
-bool covers_segment(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, const glm::dvec3& a,
-                    const glm::dvec3& b, double limit);
+bool covers_segment(const Witnesses& triangles, const Hierarchy& hierarchy, const glm::dvec3& a, const glm::dvec3& b,
+                    double limit);
 
 }  // namespace tolvol

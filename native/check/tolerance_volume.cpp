@@ -76,7 +76,6 @@ ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span
       fill_grid(options);
     } else {
       hierarchy_.emplace(reference_);
-      witnesses_ = prepare_witnesses(reference_);
     }
   });
 }
@@ -106,7 +105,7 @@ std::vector<float> ToleranceVolume::signed_distance() const {
 std::size_t ToleranceVolume::memory() const {
   constexpr std::size_t kHierarchy = 150;  // the hierarchy has this many bytes for each triangle (hierarchy.h)
   return reference_.vertices.size() * sizeof(glm::dvec3) +
-         reference_.triangles.size() * (sizeof(glm::uvec3) + sizeof(WitnessTriangle) + kHierarchy) + grid_.memory();
+         reference_.triangles.size() * (sizeof(glm::uvec3) + kHierarchy) + grid_.memory();
 }
 
 double ToleranceVolume::provable(double mapping_error) const {

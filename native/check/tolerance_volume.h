@@ -49,8 +49,8 @@ class ToleranceVolume {
   ToleranceVolume& operator=(const ToleranceVolume&) = delete;
 
   const Frame& frame() const { return frame_; }
-  const TriangleMesh& reference() const { return reference_; }                  ///< has all input vertices
-  const std::vector<WitnessTriangle>& witnesses() const { return witnesses_; }  ///< are of the reference
+  const TriangleMesh& reference() const { return reference_; }   ///< has all input vertices
+  Witnesses witnesses() const { return Witnesses(reference_); }  ///< are of the reference
   const Hierarchy& hierarchy() const { return *hierarchy_; }
   const DistanceGrid& grid() const { return grid_; }
   bool mirrored() const { return mirrored_; }  ///< tells whether the space turns the front of triangles to the back
@@ -79,7 +79,6 @@ class ToleranceVolume {
 
   Frame frame_;
   TriangleMesh reference_;
-  std::vector<WitnessTriangle> witnesses_;
   std::optional<Hierarchy> hierarchy_;
   DistanceGrid grid_;
   double tolerance_;

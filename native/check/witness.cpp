@@ -79,16 +79,6 @@ WitnessTriangle::WitnessTriangle(const glm::dvec3& a, const glm::dvec3& b, const
   gt = glm::cross(n, ab) * inverse;
 }
 
-std::vector<WitnessTriangle> prepare_witnesses(const TriangleMesh& mesh) {
-  std::vector<WitnessTriangle> witnesses;
-  witnesses.reserve(mesh.triangles.size());
-  for (const glm::uvec3& t : mesh.triangles) {
-    poll_at(witnesses.size());
-    witnesses.emplace_back(mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]);
-  }
-  return witnesses;
-}
-
 void witness_distances(const WitnessTriangle& triangle, const FourPoints& points, double out[4]) {
   if (simd_path().load(std::memory_order_relaxed) == Simd::avx2) {
     distances_avx2(triangle, points, out);

@@ -35,8 +35,21 @@ struct WitnessTriangle {
   double inverse_ab = 0, inverse_ac = 0, inverse_bc = 0;
 };
 
-/// Prepares all triangles of a mesh. O(m).
-std::vector<WitnessTriangle> prepare_witnesses(const TriangleMesh& mesh);
+/// The triangles of a mesh as witnesses. Each is prepared when it is asked for, which takes about 10 ns: prepared once
+/// and for all they would take more memory than all else that a volume holds of its reference.
+class Witnesses {
+ public:
+  /// Keeps a reference to `mesh`.
+  explicit Witnesses(const TriangleMesh& mesh) : mesh_(&mesh) {}
+  std::size_t size() const { return mesh_->triangles.size(); }
+  WitnessTriangle operator[](std::size_t triangle) const {
+    const glm::uvec3& t = mesh_->triangles[triangle];
+    return {mesh_->vertices[t.x], mesh_->vertices[t.y], mesh_->vertices[t.z]};
+  }
+
+ private:
+  const TriangleMesh* mesh_;
+};
 
 /// Computes the squared distances of the points from witnesses in the triangle, out[i] = |p_i - q_i|^2 in floating
 /// point. Any clamped parameters give a valid upper bound, so that a poor parameter, as of a needle, costs completeness

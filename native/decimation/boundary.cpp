@@ -66,12 +66,11 @@ BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mes
       return;
     }
   }
-  witnesses_ = prepare_witnesses(reference_);
   hierarchy_.emplace(reference_);
-  forward_.emplace(witnesses_, no_grid_, *hierarchy_, limit, limit);
+  forward_.emplace(Witnesses(reference_), no_grid_, *hierarchy_, limit, limit);
   backward_.emplace(reference_, limit, positions.size());
 
-  const TriangleCertificate start(witnesses_, no_grid_, *hierarchy_, provable, provable);
+  const TriangleCertificate start(Witnesses(reference_), no_grid_, *hierarchy_, provable, provable);
   const glm::dvec3 unknown(std::numeric_limits<double>::infinity());
   TriangleMesh elements{{positions.begin(), positions.end()}, {}};
   std::vector<std::uint32_t> ids;

@@ -37,8 +37,7 @@ class BoundaryBounds {
 
  private:
   TriangleMesh reference_;  // It holds boundary edges as degenerate triangles (a, b, b).
-  std::vector<WitnessTriangle> witnesses_;
-  DistanceGrid no_grid_;  // It stays empty: the hierarchy finds the segments.
+  DistanceGrid no_grid_;    // It stays empty: the hierarchy finds the segments.
   std::optional<Hierarchy> hierarchy_;
   std::optional<TriangleCertificate> forward_;
   std::optional<Coverage> backward_;

@@ -98,6 +98,7 @@ class Rounds {
   }
 
   void whole(std::size_t target) {
+    places_ = {};
     if (mesh_.certified()) mesh_.keep_apart();
     price();
     std::optional<Surroundings> around;
@@ -107,6 +108,7 @@ class Rounds {
       poll_at(e);
       loop.add(e, costs_[e]);
     }
+    costs_ = {};
     loop.run({EdgeCollapse::kNever, target}, progress_);
   }
 

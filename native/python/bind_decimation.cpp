@@ -79,12 +79,13 @@ Box to_box(const std::array<std::array<double, 3>, 2>& ends) {
 }
 
 Decimated decimate_arrays(const py::object& vertices, const py::object& triangles, const Volume* volume,
-                       const py::object& to_world, const std::string& placement, bool two_sided,
-                       std::optional<std::int64_t> target_triangles, const py::object& locked, const py::object& shares,
-                       const std::string& outside, const py::object& wedges, const std::string& effort,
-                       const std::string& crossings, std::optional<double> max_normal_angle,
-                       const std::optional<std::array<std::array<double, 3>, 2>>& cell,
-                       std::optional<double> max_seconds, std::optional<int> threads, Progress* progress) {
+                          const py::object& to_world, const std::string& placement, bool two_sided,
+                          std::optional<std::int64_t> target_triangles, const py::object& locked,
+                          const py::object& shares, const std::string& outside, const py::object& wedges,
+                          const std::string& effort, const std::string& crossings,
+                          std::optional<double> max_normal_angle,
+                          const std::optional<std::array<std::array<double, 3>, 2>>& cell,
+                          std::optional<double> max_seconds, std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const StoredSpace space(to_matrix(to_world), v.storage);
@@ -168,7 +169,7 @@ py::array_t<std::int32_t> wedges(const py::object& triangles, const py::object& 
 
 void bind_decimation(py::module_& module) {
   py::class_<Decimated>(module, "DecimationResult", py::module_local(),
-                     "The mesh that decimate returns, and where each part of it came from.")
+                        "The mesh that decimate returns, and where each part of it came from.")
       .def_readonly("vertices", &Decimated::vertices, "(k, 3) array of the input's dtype: local coordinates.")
       .def_readonly("triangles", &Decimated::triangles, "(l, 3) int32: indices of `vertices`.")
       .def_readonly("vertex_map", &Decimated::vertex_map,

@@ -131,9 +131,9 @@ py::dict make_report(const DeformationResult& r, double seconds) {
 }
 
 Deformed deform_arrays(const py::object& vertices, const PythonLattice& lattice, const py::object& faces,
-                     const Volume* volume, const py::object& to_world, const std::string& mode, bool two_sided,
-                     const std::string& outside, const std::string& crossings, std::optional<double> max_normal_angle,
-                     std::optional<int> threads, Progress* progress) {
+                       const Volume* volume, const py::object& to_world, const std::string& mode, bool two_sided,
+                       const std::string& outside, const std::string& crossings, std::optional<double> max_normal_angle,
+                       std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   int corners = 3;
   std::vector<std::uint32_t> indices;

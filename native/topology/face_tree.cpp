@@ -9,6 +9,8 @@ namespace {
 
 /// Above this share of a tree's faces, all boxes are fitted anew instead of those above each face.
 constexpr std::size_t kMany = 8;
+/// A leaf has at most this many faces. Fewer would take more nodes, and no less time.
+constexpr std::size_t kLeaf = 8;
 
 bool same(const Box& a, const Box& b) { return a.lower == b.lower && a.upper == b.upper; }
 
@@ -28,6 +30,7 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, const std::function<Box
     entries[i] = {0.5 * of_face.lower + 0.5 * of_face.upper, i};
   }
   leaves_ = std::bit_ceil((entries.size() + kLeaf - 1) / kLeaf);
+  width_ = (entries.size() + leaves_ - 1) / leaves_;
   // Level by level, each range of entries is cut in two at the median along the longest side of its centres' box.
   // `border[i]` is where the range of the level's node i begins.
   std::vector<std::size_t> border{0, entries.size()};
@@ -50,13 +53,14 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, const std::function<Box
     next.back() = entries.size();
     border.swap(next);
   }
-  fill(slots_, leaves_ * kLeaf, Slot());
+  fill(boxes_, leaves_ * width_, Box());
+  fill(numbers_, boxes_.size(), 0u);
   fill(nodes_, 2 * leaves_ - 1, Box());
   for (std::size_t leaf = 0; leaf < leaves_; ++leaf) {
     poll_at(leaf);
-    for (std::size_t i = border[leaf], slot = leaf * kLeaf; i < border[leaf + 1]; ++i, ++slot) {
+    for (std::size_t i = border[leaf], slot = leaf * width_; i < border[leaf + 1]; ++i, ++slot) {
       const std::uint32_t index = entries[i].index;
-      slots_[slot] = {box(index), faces[index]};
+      boxes_[slot] = box(index), numbers_[slot] = faces[index];
       place_[index] = static_cast<std::uint32_t>(slot);
     }
     fit_leaf(leaf);
@@ -70,7 +74,7 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, const std::function<Box
 void FaceTree::fit_leaf(std::size_t leaf) {
   Box& box = nodes_[leaves_ - 1 + leaf];
   box = {};
-  for (std::size_t i = leaf * kLeaf; i < (leaf + 1) * kLeaf; ++i) box.add(slots_[i].box);
+  for (std::size_t i = leaf * width_; i < (leaf + 1) * width_; ++i) box.add(boxes_[i]);
 }
 
 Box FaceTree::fitted(std::size_t node) const {
@@ -90,7 +94,7 @@ void FaceTree::change(std::span<const std::uint32_t> faces, std::span<const Box>
     for (std::size_t i = 0; i < faces.size(); ++i) change(faces[i], boxes[i]);
     return;
   }
-  for (std::size_t i = 0; i < faces.size(); ++i) slots_[slot_of(faces[i])].box = boxes[i];
+  for (std::size_t i = 0; i < faces.size(); ++i) boxes_[slot_of(faces[i])] = boxes[i];
   for (std::size_t leaf = 0; leaf < leaves_; ++leaf) fit_leaf(leaf);
   for (std::size_t node = leaves_ - 1; node-- > 0;) nodes_[node] = fitted(node);
 }
@@ -107,8 +111,8 @@ double FaceTree::extent() const {
 }
 
 void FaceTree::change(std::uint32_t face, const Box& box) {
-  const std::size_t slot = slot_of(face), leaf = slot / kLeaf;
-  slots_[slot].box = box;
+  const std::size_t slot = slot_of(face), leaf = slot / width_;
+  boxes_[slot] = box;
   fit_leaf(leaf);
   for (std::size_t node = leaves_ - 1 + leaf; node > 0;) {
     node = (node - 1) / 2;

@@ -196,7 +196,7 @@ TEST(Certificate, APointOutsideIsSoughtAmongTheHintsFirst) {
     for (int k = 0; k < 3; ++k) tangle.vertices.push_back(0.3 * random.point());
     tangle.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
   }
-  const std::vector<WitnessTriangle> witnesses = prepare_witnesses(tangle);
+  const Witnesses witnesses(tangle);
   const Hierarchy hierarchy(tangle);
   const DistanceGrid no_grid;
   const TriangleCertificate certificate(witnesses, no_grid, hierarchy, 0.001, 0.0011);

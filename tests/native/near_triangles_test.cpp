@@ -44,7 +44,7 @@ Work follow(const TriangleMesh& mesh, std::uint32_t face, int levels, std::optio
   rule.bound_normals(hierarchy);
   std::optional<Facing> facing;
   if (normal) facing.emplace(rule, *normal, rule.angle);
-  const std::vector<WitnessTriangle> witnesses = prepare_witnesses(mesh);
+  const Witnesses witnesses(mesh);
   const glm::uvec3 t = mesh.triangles[face];
   const dvec3 step(0.3 * kRadius, -0.2 * kRadius, 0.4 * kRadius);
   const dvec3 end = mesh.vertices[t.x] + step;
@@ -110,7 +110,7 @@ TEST(NearTriangles, AmongSmallTrianglesASearchCostsLessThanAList) {
 TEST(NearTriangles, NothingNearIsNoTriangle) {
   const TriangleMesh mesh = tangle(50);
   const Hierarchy hierarchy(mesh);
-  const std::vector<WitnessTriangle> witnesses = prepare_witnesses(mesh);
+  const Witnesses witnesses(mesh);
   NearTriangles around;
   around.begin(witnesses, hierarchy, kRadius);
   for (int i = 0; i < 30; ++i) {

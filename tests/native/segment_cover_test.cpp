@@ -11,11 +11,11 @@ using namespace tolvol;
 using glm::dvec3;
 
 struct Triangles {
-  explicit Triangles(const TriangleMesh& mesh) : witnesses(prepare_witnesses(mesh)), hierarchy(mesh) {}
+  explicit Triangles(const TriangleMesh& mesh) : witnesses(mesh), hierarchy(mesh) {}
   bool cover(const dvec3& a, const dvec3& b, double limit) const {
     return covers_segment(witnesses, hierarchy, a, b, limit);
   }
-  std::vector<WitnessTriangle> witnesses;
+  Witnesses witnesses;
   Hierarchy hierarchy;
 };
 
