@@ -15,11 +15,15 @@
 namespace tolvol {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 class Decimation {
  public:
   Decimation(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const StoredSpace& space,
-             const ToleranceVolume* volume, const DecimationOptions& options, bool joins_t_junctions)
+             const ToleranceVolume* volume, const DecimationOptions& options, bool joins_t_junctions,
+             Clock::time_point start)
       : options_(options),
+        start_(start),
         // A baseline answers one question after another.
         team_(options.baseline ? 1 : std::min(thread_count(options.threads), kMostThreads)),
         input_(vertices, triangles, space, volume, options, joins_t_junctions, team_, result_) {}
@@ -50,7 +54,7 @@ class Decimation {
  private:
   bool is_out_of_time() {
     if (!(options_.max_seconds > 0)) return false;
-    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start_;
+    const std::chrono::duration<double> spent = Clock::now() - start_;
     result_.stopped_at_time = spent.count() > options_.max_seconds;
     return result_.stopped_at_time;
   }
@@ -71,7 +75,7 @@ class Decimation {
   }
 
   const DecimationOptions& options_;
-  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  const Clock::time_point start_;
   Team team_;
   DecimationResult result_;
   DecimationInput input_;
@@ -82,10 +86,11 @@ class Decimation {
 DecimationResult decimate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                           const StoredSpace& space, const ToleranceVolume* volume, const DecimationOptions& options) {
   const Call call(options.progress);
-  DecimationResult result = Decimation(vertices, triangles, space, volume, options, true).run();
+  const Clock::time_point start = Clock::now();
+  DecimationResult result = Decimation(vertices, triangles, space, volume, options, true, start).run();
   // Pieces of triangles that were divided at T-junctions may be left where hardly anything can collapse.
   if (result.triangles.size() <= triangles.size()) return result;
-  return Decimation(vertices, triangles, space, volume, options, false).run();
+  return Decimation(vertices, triangles, space, volume, options, false, start).run();
 }
 
 }  // namespace tolvol

@@ -171,13 +171,18 @@ void MovingMesh::measure(std::span<const std::uint32_t> faces, Progress* progres
       unknown.push_back(v);
     }
   }
-  parallel_for(unknown.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
-    if (progress) progress->update(progress->fraction());
-    for (std::size_t i = begin; i < end; ++i) {
-      VertexState& state = trial_[unknown[i]];
-      state.bound = bound_at(unknown[i], state.at, Aim::wish);
-    }
-  });
+  try {
+    parallel_for(unknown.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
+      if (progress) progress->update(progress->fraction());
+      for (std::size_t i = begin; i < end; ++i) {
+        VertexState& state = trial_[unknown[i]];
+        state.bound = bound_at(unknown[i], state.at, Aim::wish);
+      }
+    });
+  } catch (...) {  // Vertices that do not move are not taken back.
+    for (const std::uint32_t v : unknown) trial_[v].bound = {};
+    throw;
+  }
 }
 
 /// Writes trial_distance_ of all these faces.

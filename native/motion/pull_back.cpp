@@ -84,8 +84,8 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
                                 std::span<const glm::dvec3> after, Mode mode, Progress* progress) {
   if (coverage_) coverage_->tidy();
   if (crossings_) crossings_->tidy();
-  mesh_.try_all(moving.vertices, before, after);
   try {
+    mesh_.try_all(moving.vertices, before, after);
     return finish({moving, before, after}, mode, progress);
   } catch (...) {
     for (const std::uint32_t v : moving.vertices) mesh_.take_back(v), held_index_[v] = kNone;

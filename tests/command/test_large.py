@@ -147,6 +147,16 @@ def test_two_runs_do_not_share_a_scratch_folder(torus, tmp_path):
     assert process.wait() == 0 and not scratch.exists()
 
 
+def test_a_run_that_was_killed_in_its_first_record_can_be_repeated(torus, tmp_path):
+    scratch = tmp_path / "scratch"
+    for extra in ((), ("--resume",)):
+        scratch.mkdir()
+        (scratch / "run.0123456789abcdef.partial").write_text('{"')
+        done = decimate(torus, tmp_path / "out.ply", "--scratch", scratch, *extra)
+        assert done.returncode == 0, done.stderr
+        assert not scratch.exists()
+
+
 def test_what_cannot_be_done_is_refused_before_any_work(torus, tmp_path):
     out = tmp_path / "out.ply"
     other = tmp_path / "other"

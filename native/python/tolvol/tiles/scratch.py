@@ -10,6 +10,7 @@ import json
 import os
 import shutil
 import uuid
+from fnmatch import fnmatch
 from pathlib import Path
 
 from ..shared.errors import Refused
@@ -65,7 +66,8 @@ class Scratch:
     def _require_own(self):
         """Raises Refused for a folder of other files, into which nothing is written."""
         names = sorted(path.name for path in self.folder.iterdir())
-        others = [name for name in names if name != "lock"]
+        # A run that was killed while it wrote its first record has left a part of that.
+        others = [name for name in names if name != "lock" and not fnmatch(name, f"{_ASKED}.*.partial")]
         if others and f"{_ASKED}.json" not in names:
             raise Refused(f"{self.folder}: this folder holds other files ({others[0]}): choose an empty one")
 
@@ -107,4 +109,5 @@ def keep(path, record):
             os.fsync(file.fileno())
         os.replace(partial, f"{path}.json")
     except OSError as error:
+        partial.unlink(missing_ok=True)
         raise soups.failed(error, path) from None
