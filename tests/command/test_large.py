@@ -152,8 +152,7 @@ def test_a_run_that_was_killed_in_its_first_record_can_be_repeated(torus, tmp_pa
     for extra in ((), ("--resume",)):
         scratch.mkdir()
         (scratch / "run.0123456789abcdef.partial").write_text('{"')
-        done = decimate(torus, tmp_path / "out.ply", "--scratch", scratch, *extra)
-        assert done.returncode == 0, done.stderr
+        succeeded(decimate(torus, tmp_path / "out.ply", "--scratch", scratch, *extra))
         assert not scratch.exists()
 
 
