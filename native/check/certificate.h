@@ -40,7 +40,8 @@ class Certificate final : public ToleranceCheck {
 class TriangleCertificate {
  public:
   /// `limit` is the provable distance (ToleranceVolume::provable()) and `beyond` the refutable one, in the frame. Keeps
-  /// references to the other arguments. With a grid without nodes the hierarchy finds all triangles.
+  /// references to the mesh of `reference`, to the grid and to the hierarchy. With a grid without nodes the hierarchy
+  /// finds all triangles.
   TriangleCertificate(const Witnesses& reference, const DistanceGrid& grid, const Hierarchy& hierarchy, double limit,
                       double beyond);
 

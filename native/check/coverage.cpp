@@ -391,6 +391,7 @@ void Coverage::commit(const Trial& trial) {
   for (const Trial::RemovedList& h : trial.removed_lists_) {
     // This frees the memory of the element, which is gone; clear() would keep it.
     const PieceList pieces = std::exchange(pieces_[h.id], {});
+    distance_[h.id] = kNoPiece;
     if (h.whole) pieces_[trial.candidates_[h.successor].id].append(pieces);
   }
   for (std::size_t i = 0; i < moved.size(); ++i) {

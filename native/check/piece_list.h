@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Pieces of a reference's triangles, in order. Nearly all lists hold one whole triangle, of which only the number is
-/// kept: 16 bytes instead of the 80 of a Part and those of a vector.
+/// Pieces of a reference's triangles, in order. At first nearly every list holds one whole triangle, and takes 16 bytes
+/// for it; a Part takes 80.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "check/part.h"
@@ -67,7 +68,7 @@ class PieceList {
   Several& several() {
     if (!several_) {
       several_ = std::make_unique<Several>();
-      if (only_ != kNone) several_->names.push_back(only_);
+      if (only_ != kNone) several_->names.push_back(std::exchange(only_, kNone));
     }
     return *several_;
   }
@@ -79,8 +80,9 @@ class PieceList {
     }
   }
 
-  std::uint32_t only_ = kNone;        ///< The triangle of a list that is one whole triangle and has had no other piece.
+  std::uint32_t only_ = kNone;        ///< The one whole triangle, as long as there has been no other piece.
   std::unique_ptr<Several> several_;  ///< All pieces, in any other list that is not empty.
 };
+static_assert(sizeof(PieceList) == 16);
 
 }  // namespace tolvol

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <glm/glm.hpp>
-#include <vector>
 
 #include "check/witness.h"
 #include "geometry/hierarchy.h"

@@ -50,7 +50,7 @@ class ToleranceVolume {
 
   const Frame& frame() const { return frame_; }
   const TriangleMesh& reference() const { return reference_; }   ///< has all input vertices
-  Witnesses witnesses() const { return Witnesses(reference_); }  ///< are of the reference
+  Witnesses witnesses() const { return Witnesses(reference_); }  ///< are the reference's triangles
   const Hierarchy& hierarchy() const { return *hierarchy_; }
   const DistanceGrid& grid() const { return grid_; }
   bool mirrored() const { return mirrored_; }  ///< tells whether the space turns the front of triangles to the back

@@ -6,7 +6,6 @@
 
 #include <cstdint>
 
-#include "base/call.h"
 #include "base/simd.h"
 
 namespace tolvol {

@@ -97,8 +97,9 @@ class Rounds {
     }
   }
 
+  /// Works on the whole mesh, and comes last.
   void whole(std::size_t target) {
-    places_ = {};
+    places_ = {};  // is needed no longer, and its memory is
     if (mesh_.certified()) mesh_.keep_apart();
     price();
     std::optional<Surroundings> around;
@@ -108,7 +109,7 @@ class Rounds {
       poll_at(e);
       loop.add(e, costs_[e]);
     }
-    costs_ = {};
+    costs_ = {};  // likewise
     loop.run({EdgeCollapse::kNever, target}, progress_);
   }
 

@@ -130,14 +130,17 @@ std::vector<std::uint32_t> MovingCoverage::still_failing(std::span<const std::ui
 }
 
 std::vector<std::uint32_t> MovingCoverage::failing_around(std::span<const std::uint32_t> vertices) {
-  // The pieces of a face go to faces that share a corner with it.
+  // Nearly always the pieces of a face go to faces that share a corner with it.
   std::vector<std::uint32_t> faces = mesh_->faces_around(corners_of(mesh_->faces_around(vertices)));
   std::ranges::sort(faces);
   std::vector<std::uint32_t> all;
+  bool is_worn = false;
   for (Layer& layer : layers_) {
     const std::vector<std::uint32_t> failed = failing(layer, unsettled(layer, faces), Neighbours::only_take_pieces);
     all.insert(all.end(), failed.begin(), failed.end());
+    is_worn = is_worn || is_worn_;
   }
+  is_worn_ = is_worn;
   std::ranges::sort(all);
   all.erase(std::unique(all.begin(), all.end()), all.end());
   return all;

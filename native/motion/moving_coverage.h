@@ -32,8 +32,9 @@ class MovingCoverage {
   std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces);
   /// Takes another look at faces that failing() returned: which of them fail still? It proves nothing of other faces.
   std::vector<std::uint32_t> still_failing(std::span<const std::uint32_t> failed);
-  /// The same as failing(), if no face failed before these vertices went elsewhere, for all triangulations together: it
-  /// looks only at faces whose pieces might lose a witness by that. It proves nothing: failing() has the last word.
+  /// Returns faces around these vertices, which went elsewhere, whose pieces have no witness now, in any triangulation.
+  /// It is for a quick look between two calls of failing(): it may miss a face, or return one that failing() would not,
+  /// and proves nothing.
   std::vector<std::uint32_t> failing_around(std::span<const std::uint32_t> vertices);
   /// Returns faces of `faces`, whose corners are others now, whose pieces would have no witness in the state, which is
   /// on trial, and those that have been nearest to an uncovered part of the reference since the start; none if there is
@@ -41,7 +42,8 @@ class MovingCoverage {
   std::vector<std::uint32_t> failing_replaced(std::span<const std::uint32_t> faces);
   /// Goes with the mesh to its trial, for which failing() found no face last. The mesh itself accepts it after this.
   void accept(std::span<const std::uint32_t> faces);
-  /// Whether failing() last found a piece that had been divided so often that it could not be divided again.
+  /// Whether the last look for witnesses found a piece that had been divided so often that it could not be divided
+  /// again.
   bool is_worn() const { return is_worn_; }
   /// Finds all witnesses of the state anew, as at the start. Costs as much, and does nothing if not all were found
   /// then.

@@ -42,7 +42,7 @@ void PullBack::back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Pr
   std::vector<std::uint32_t> changed, lost, untested = wish.moving.faces, since, again;
   // Witnesses are sought for all faces at first and at last, and for those around what went back in between.
   std::vector<std::uint32_t> went_back;
-  bool is_sought = false, is_renewed = false;
+  bool has_asked_all = false, is_renewed = false;
   std::size_t rounds = 0;
   if (!next_twin_.empty()) hold_twins(wish, wish.moving.vertices, held, changed);
   for (;;) {
@@ -50,11 +50,11 @@ void PullBack::back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Pr
     std::vector<std::uint32_t> failed = mesh_.failing(mesh_.faces_around(changed), progress);
     if (failed.empty() && coverage_) {
       if (!lost.empty()) lost = coverage_->still_failing(lost);
-      if (lost.empty() && is_sought) {
+      if (lost.empty() && has_asked_all) {
         lost = coverage_->failing_around(went_back);
         went_back.clear();
       }
-      if (lost.empty()) lost = coverage_->failing(wish.moving.faces), is_sought = true;
+      if (lost.empty()) lost = coverage_->failing(wish.moving.faces), has_asked_all = true;
       if (!lost.empty() && !is_renewed && coverage_->is_worn()) {
         is_renewed = true;
         coverage_->renew();

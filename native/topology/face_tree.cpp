@@ -30,7 +30,7 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, const std::function<Box
     entries[i] = {0.5 * of_face.lower + 0.5 * of_face.upper, i};
   }
   leaves_ = std::bit_ceil((entries.size() + kLeaf - 1) / kLeaf);
-  width_ = (entries.size() + leaves_ - 1) / leaves_;
+  slots_of_leaf_ = (entries.size() + leaves_ - 1) / leaves_;
   // Level by level, each range of entries is cut in two at the median along the longest side of its centres' box.
   // `border[i]` is where the range of the level's node i begins.
   std::vector<std::size_t> border{0, entries.size()};
@@ -53,12 +53,12 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, const std::function<Box
     next.back() = entries.size();
     border.swap(next);
   }
-  fill(boxes_, leaves_ * width_, Box());
+  fill(boxes_, leaves_ * slots_of_leaf_, Box());
   fill(numbers_, boxes_.size(), 0u);
   fill(nodes_, 2 * leaves_ - 1, Box());
   for (std::size_t leaf = 0; leaf < leaves_; ++leaf) {
     poll_at(leaf);
-    for (std::size_t i = border[leaf], slot = leaf * width_; i < border[leaf + 1]; ++i, ++slot) {
+    for (std::size_t i = border[leaf], slot = leaf * slots_of_leaf_; i < border[leaf + 1]; ++i, ++slot) {
       const std::uint32_t index = entries[i].index;
       boxes_[slot] = box(index), numbers_[slot] = faces[index];
       place_[index] = static_cast<std::uint32_t>(slot);
@@ -74,7 +74,7 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, const std::function<Box
 void FaceTree::fit_leaf(std::size_t leaf) {
   Box& box = nodes_[leaves_ - 1 + leaf];
   box = {};
-  for (std::size_t i = leaf * width_; i < (leaf + 1) * width_; ++i) box.add(boxes_[i]);
+  for (std::size_t i = leaf * slots_of_leaf_; i < (leaf + 1) * slots_of_leaf_; ++i) box.add(boxes_[i]);
 }
 
 Box FaceTree::fitted(std::size_t node) const {
@@ -111,7 +111,7 @@ double FaceTree::extent() const {
 }
 
 void FaceTree::change(std::uint32_t face, const Box& box) {
-  const std::size_t slot = slot_of(face), leaf = slot / width_;
+  const std::size_t slot = slot_of(face), leaf = slot / slots_of_leaf_;
   boxes_[slot] = box;
   fit_leaf(leaf);
   for (std::size_t node = leaves_ - 1 + leaf; node > 0;) {

@@ -62,7 +62,7 @@ TEST(BetweenPolls, ATreeOfFaces) {
   Team team(1);
   // There is a poll for each node that is cut in two, and further ones while the faces, the leaves and the nodes above
   // them are written.
-  const std::size_t leaves = std::bit_ceil(n / 4u);
+  const std::size_t leaves = std::bit_ceil(n / 8u);
   EXPECT_GE(polls_of([&] { FaceTree(faces, boxes, team); }), leaves - 1 + n / 4096 + 2 * (leaves / 4096));
 }
 

@@ -46,7 +46,7 @@ std::set<std::uint32_t> among(const std::vector<Box>& boxes, const Box& box) {
 TEST(FaceTree, FindsWhatMeetsABoxWhileFacesChangeAndVanish) {
   Random random(5);
   Team team(2);
-  for (const std::size_t count : {0u, 1u, 4u, 5u, 17u, 300u, 1025u}) {
+  for (const std::size_t count : {0u, 1u, 8u, 9u, 16u, 65u, 300u, 1025u}) {
     std::vector<Box> boxes(count);
     for (Box& box : boxes) box = random_box(random);
     FaceTree tree = tree_of(boxes, team);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "base/errors.h"
@@ -40,7 +41,7 @@ class Cancels {
         options_(options) {}
 
   const TriangleMesh& mesh() const { return mesh_; }
-  /// Every `stride`-th vertex goes `by` tolerances at most in a random direction.
+  /// Every `stride`-th vertex goes about `by` tolerances in a random direction.
   std::vector<float> wish(std::size_t stride, double by, unsigned seed) const {
     shapes::Random random(seed);
     std::vector<dvec3> points = mesh_.vertices;

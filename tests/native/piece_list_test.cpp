@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
 #include <vector>
 
 #include "shapes.h"
@@ -58,6 +59,32 @@ TEST(PieceList, KeepsWholeTrianglesAndPartsInOrder) {
   expect(list, {}, reference);
   for (const Part& piece : other) list.push_back(piece);
   expect(list, other, reference);
+}
+
+// The number of one whole triangle is kept elsewhere than those of several pieces.
+TEST(PieceList, OfOneWholeTriangleGrowsAndShrinks) {
+  const TriangleMesh reference = shapes::torus(10);
+  const Part a = PieceList::whole(3, reference), b = PieceList::whole(7, reference);
+  PieceList one, empty, moved;
+  one.push_back(a);
+  expect(one, {a}, reference);
+  EXPECT_EQ(one.parts().size(), 0u);
+  empty.append(PieceList());
+  expect(empty, {}, reference);
+  empty.append(one);
+  expect(empty, {a}, reference);
+  empty.append(one);
+  expect(empty, {a, a}, reference);
+  one.clear();
+  expect(one, {}, reference);
+  one.push_back(b), one.push_back(a);
+  expect(one, {b, a}, reference);
+  moved = std::exchange(one, {});
+  expect(one, {}, reference);
+  expect(moved, {b, a}, reference);
+  moved.clear();
+  moved.push_back(a);
+  expect(moved, {a}, reference);
 }
 
 }  // namespace

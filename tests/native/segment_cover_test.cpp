@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "shapes.h"
 
 namespace {
@@ -11,10 +13,11 @@ using namespace tolvol;
 using glm::dvec3;
 
 struct Triangles {
-  explicit Triangles(const TriangleMesh& mesh) : witnesses(mesh), hierarchy(mesh) {}
+  explicit Triangles(TriangleMesh m) : mesh(std::move(m)), witnesses(mesh), hierarchy(mesh) {}
   bool cover(const dvec3& a, const dvec3& b, double limit) const {
     return covers_segment(witnesses, hierarchy, a, b, limit);
   }
+  TriangleMesh mesh;
   Witnesses witnesses;
   Hierarchy hierarchy;
 };

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs clang-tidy on a share of the native sources: clang_tidy.py INDEX COUNT [--all].
 
-A source is left out if clang-tidy has passed it with the same contents, the same contents of all files that it includes, the
-same compile command, the same configuration and the same clang-tidy. With --all no source is left out.
+A source is left out if clang-tidy has passed it with the same contents of all files that it is compiled with, those of the
+sources that CMake joins with it among them, the same options, the same configuration and the same clang-tidy. With --all no
+source is left out.
 """
 
 import argparse
@@ -41,12 +42,12 @@ def compiled():
         first = next(place for place, word in enumerate(words) if word.startswith("-"))
         options.setdefault(Path(entry["file"]), words[first : words.index("-o")])
     found = {}
-    for block in said_by("ninja", "-C", str(BUILD), "-t", "deps").split("\n\n"):
+    for block in sorted(said_by("ninja", "-C", str(BUILD), "-t", "deps").split("\n\n")):
         header, *lines = block.splitlines() or [""]
         paths = [Path(os.path.normpath(BUILD / line.strip())) for line in lines if line.startswith(" ")]
         if header.endswith("(VALID)") and paths and paths[0] in options:
             for source in SOURCES.intersection(paths):
-                found[source] = options[paths[0]], paths
+                found.setdefault(source, (options[paths[0]], paths))
     return found
 
 

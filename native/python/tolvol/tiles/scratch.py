@@ -109,5 +109,6 @@ def keep(path, record):
             os.fsync(file.fileno())
         os.replace(partial, f"{path}.json")
     except OSError as error:
-        partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            partial.unlink()
         raise soups.failed(error, path) from None
