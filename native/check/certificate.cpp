@@ -133,8 +133,8 @@ std::optional<glm::dvec3> TriangleCertificate::nearby_point(const glm::dvec3& p)
         std::find(seen.begin(), seen.begin() + count, triangle) != seen.begin() + count)
       continue;
     seen[count++] = triangle;
-    const WitnessTriangle t = reference_[triangle];
-    const ClosestPoint q = closest_point(p, t.a, t.a + t.ab, t.a + t.ac);
+    const auto [a, b, c] = reference_.corners(triangle);
+    const ClosestPoint q = closest_point(p, a, b, c);
     if (q.distance_squared < nearest2) nearest2 = q.distance_squared, nearest = q.point;
   }
   return nearest;
@@ -144,8 +144,8 @@ std::optional<glm::dvec3> TriangleCertificate::nearest_point(const glm::dvec3& p
                                                              const Facing* facing) const {
   const Hierarchy::Nearest nearest = facing ? facing->nearest(*hierarchy_, p, radius) : hierarchy_->nearest(p, radius);
   if (nearest.triangle == Hierarchy::kNone) return std::nullopt;
-  const WitnessTriangle t = reference_[nearest.triangle];
-  return closest_point(p, t.a, t.a + t.ab, t.a + t.ac).point;
+  const auto [a, b, c] = reference_.corners(nearest.triangle);
+  return closest_point(p, a, b, c).point;
 }
 
 bool TriangleCertificate::is_open(const glm::dvec3& p, const Facing* facing, const glm::uvec3& hints) const {
@@ -153,8 +153,8 @@ bool TriangleCertificate::is_open(const glm::dvec3& p, const Facing* facing, con
   bool is_open = true;
   const auto visit = [&](std::uint32_t triangle) {
     if (facing && !facing->admits(triangle)) return true;
-    const WitnessTriangle t = reference_[triangle];
-    is_open = !(closest_point(p, t.a, t.a + t.ab, t.a + t.ac).distance_squared <= radius * radius);
+    const auto [a, b, c] = reference_.corners(triangle);
+    is_open = !(closest_point(p, a, b, c).distance_squared <= radius * radius);
     return is_open;
   };
   for (const std::uint32_t triangle : {hints.x, hints.y, hints.z, grid_->triangle_near(p)}) {

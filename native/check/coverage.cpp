@@ -249,15 +249,16 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   bool settled = true;
   for (const Element& e : elements) {
     poll_at(trial.candidates_.size() + 1);  // Most changes have a few elements and need no poll.
-    const bool keeps = e.moved == 0 || settles(e.id, e.moved);
+    const double distance = distance_after(e.id, e.moved);
+    const bool keeps = e.moved == 0 || distance <= limit_;
     settled &= keeps;
-    trial.candidates_.push_back({e.id, {}, keeps ? distance_after(e.id, e.moved) : kNoPiece, !keeps});
+    trial.candidates_.push_back({e.id, {}, keeps ? distance : kNoPiece, !keeps});
   }
   for (const Removed& r : removed) {
-    const bool whole = settles(r.id, r.moved);
+    const double distance = distance_after(r.id, r.moved);
+    const bool whole = distance <= limit_;
     settled &= whole;
-    double& distance = trial.candidates_[r.successor].distance;
-    if (whole) distance = std::max(distance, distance_after(r.id, r.moved));
+    if (whole) trial.candidates_[r.successor].distance = std::max(trial.candidates_[r.successor].distance, distance);
     trial.removed_lists_.push_back({r.id, r.successor, whole});
   }
   if (settled) return true;

@@ -71,14 +71,16 @@ std::vector<float> corners_to_send(const PlacedPieces& pieces, std::size_t begin
 
 GlCertificate::GlCertificate(const ToleranceVolume& volume) : ToleranceCheck(volume), renderer_(gl::renderer().name()) {
   const std::vector<std::uint32_t>& nodes = volume.grid().triangle;
-  const Witnesses reference = volume.witnesses();
-  const auto coordinates = [&](glm::dvec3 WitnessTriangle::*member) {
+  const TriangleMesh& reference = volume.reference();
+  // Of corner 0 of each triangle, or of the edge from there to another corner.
+  const auto coordinates = [&](int corner) {
     std::vector<float> values;
-    values.reserve(3 * reference.size());
-    for (std::size_t i = 0; i < reference.size(); ++i) {
-      poll_at(i);
-      const WitnessTriangle t = reference[i];
-      for (int k = 0; k < 3; ++k) values.push_back(static_cast<float>((t.*member)[k]));
+    values.reserve(3 * reference.triangles.size());
+    for (const glm::uvec3& t : reference.triangles) {
+      poll_at(values.size());
+      const glm::dvec3 &a = reference.vertices[t.x], &end = reference.vertices[t[corner]];
+      const glm::dvec3 value = corner == 0 ? a : end - a;
+      for (int k = 0; k < 3; ++k) values.push_back(static_cast<float>(value[k]));
     }
     return values;
   };
@@ -87,11 +89,11 @@ GlCertificate::GlCertificate(const ToleranceVolume& volume) : ToleranceCheck(vol
       gl::Buffer::require_room(bytes, what, "the method certificate");
     };
     require_room(nodes.size() * sizeof(std::uint32_t), "the ids at the grid's nodes");
-    require_room(3 * reference.size() * sizeof(float), "the corners of the reference's triangles");
+    require_room(3 * reference.triangles.size() * sizeof(float), "the corners of the reference's triangles");
     nodes_ = gl::Buffer(nodes);
-    a_ = gl::Buffer(coordinates(&WitnessTriangle::a));
-    ab_ = gl::Buffer(coordinates(&WitnessTriangle::ab));
-    ac_ = gl::Buffer(coordinates(&WitnessTriangle::ac));
+    a_ = gl::Buffer(coordinates(0));
+    ab_ = gl::Buffer(coordinates(1));
+    ac_ = gl::Buffer(coordinates(2));
     gl::of_context<CertificateProgram>();
   });
 }

@@ -75,10 +75,9 @@ double NearTriangles::reach(const Part& part, const glm::dvec3& centre) const {
 }
 
 void NearTriangles::look_at(std::uint32_t triangle, const glm::dvec3& centre, double reach2) {
-  const WitnessTriangle t = (*triangles_)[triangle];
-  const glm::dvec3 b = t.a + t.ab, c = t.a + t.ac;
-  if (is_beyond(centre, t.a, b, c, reach2)) return;
-  const double squared = closest_point(centre, t.a, b, c).distance_squared;
+  const auto [a, b, c] = triangles_->corners(triangle);
+  if (is_beyond(centre, a, b, c, reach2)) return;
+  const double squared = closest_point(centre, a, b, c).distance_squared;
   if (squared > reach2) return;
   pool_.push_back(triangle);
   if (squared < best2_) {

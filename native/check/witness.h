@@ -3,6 +3,7 @@
 /// from one triangle, each by an explicit witness in that triangle.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <glm/glm.hpp>
 
@@ -46,6 +47,13 @@ class Witnesses {
   WitnessTriangle operator[](std::size_t triangle) const {
     const glm::uvec3& t = mesh_->triangles[triangle];
     return {mesh_->vertices[t.x], mesh_->vertices[t.y], mesh_->vertices[t.z]};
+  }
+
+  /// The corners, with the rounding of the edges that start in the first one. A closest point needs no more.
+  std::array<glm::dvec3, 3> corners(std::size_t triangle) const {
+    const glm::uvec3& t = mesh_->triangles[triangle];
+    const glm::dvec3& a = mesh_->vertices[t.x];
+    return {a, a + (mesh_->vertices[t.y] - a), a + (mesh_->vertices[t.z] - a)};
   }
 
  private:

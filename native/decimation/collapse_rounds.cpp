@@ -97,9 +97,9 @@ class Rounds {
     }
   }
 
-  /// Works on the whole mesh, and comes last.
+  /// Works on the whole mesh. It is called last, because it frees what the rounds need.
   void whole(std::size_t target) {
-    places_ = {};  // is needed no longer, and its memory is
+    places_ = {};
     if (mesh_.certified()) mesh_.keep_apart();
     price();
     std::optional<Surroundings> around;
@@ -109,7 +109,7 @@ class Rounds {
       poll_at(e);
       loop.add(e, costs_[e]);
     }
-    costs_ = {};  // likewise
+    costs_ = {};
     loop.run({EdgeCollapse::kNever, target}, progress_);
   }
 

@@ -47,24 +47,14 @@ struct Scene {
 
   TriangleMesh mesh;
   ToleranceVolume volume{mesh.vertices, mesh.triangles, kStored, 0.08, {.precision = 1, .threads = 1}};
-  std::vector<std::uint32_t> faces = indices(mesh);
+  std::vector<std::uint32_t> faces = shapes::indices(mesh);
   std::vector<dvec3> wish = pushed(0.3);
 
-  static std::vector<std::uint32_t> indices(const TriangleMesh& mesh) {
-    std::vector<std::uint32_t> result;
-    for (const glm::uvec3& t : mesh.triangles) result.insert(result.end(), {t.x, t.y, t.z});
-    return result;
-  }
   /// Every third vertex by up to so much.
   std::vector<dvec3> pushed(double by) const {
     std::vector<dvec3> result = mesh.vertices;
     for (std::size_t v = 0; v < result.size(); v += 3) result[v] += by * dvec3(0.1 * double(v % 7), 0.3, 0.5);
     for (dvec3& p : result) p = rounded_to_float32(p);
-    return result;
-  }
-  std::vector<float> flat(const std::vector<dvec3>& points) const {
-    std::vector<float> result;
-    for (const dvec3& p : points) result.insert(result.end(), {float(p.x), float(p.y), float(p.z)});
     return result;
   }
   Numbers decimated(DecimationOptions options) const {
@@ -279,7 +269,7 @@ TEST(Allocation, Deformation) {
 
 TEST(Allocation, AGuardKeepsItsState) {
   const Scene scene;
-  const std::vector<float> start = scene.flat(scene.mesh.vertices), wish = scene.flat(scene.wish);
+  const std::vector<float> start = shapes::flat(scene.mesh.vertices), wish = shapes::flat(scene.wish);
   const Guard::Options options{Outside::error, false, PullBack::Crossings::keep_out, 90, 1, nullptr};
   const auto made = [&] { return Guard(start, scene.faces, 3, glm::dmat4(1), scene.volume, options).vertex_count(); };
   EXPECT_GT(fail_allocations([&] { return Numbers{double(made())}; }), 10);
@@ -293,7 +283,7 @@ TEST(Allocation, AGuardKeepsItsState) {
   };
   const Numbers expected = correction_of_the_wish();
   EXPECT_GT(expected.size(), 10u);
-  const std::vector<float> other = scene.flat(scene.pushed(0.03));
+  const std::vector<float> other = shapes::flat(scene.pushed(0.03));
   for (const std::function<void()>& call :
        {std::function<void()>([&] { guard.constrain(wish); }), std::function<void()>([&] { guard.reset(other); })}) {
     // Calls with the n-th allocation failing. Returns whether there was one. The state is then that before the call.

@@ -47,11 +47,7 @@ std::vector<glm::dvec3> pushed() {
   return result;
 }
 
-std::vector<std::uint32_t> indices() {
-  std::vector<std::uint32_t> result;
-  for (const glm::uvec3& t : wavy().triangles) result.insert(result.end(), {t.x, t.y, t.z});
-  return result;
-}
+std::vector<std::uint32_t> indices() { return shapes::indices(wavy()); }
 
 struct NamedCall {
   const char* name;

@@ -15,14 +15,9 @@ namespace {
 
 using namespace tolvol;
 using glm::dvec3;
+using shapes::indices;
 using Options = DeformationOptions;
 using Mode = DeformationOptions::Mode;
-
-std::vector<std::uint32_t> indices(const TriangleMesh& mesh) {
-  std::vector<std::uint32_t> result;
-  for (const glm::uvec3& t : mesh.triangles) result.insert(result.end(), {t.x, t.y, t.z});
-  return result;
-}
 
 /// A box somewhat larger than the torus of the shapes.
 const glm::dmat4 kAroundTorus(3.2, 0, 0, 0, 0, 3.2, 0, 0, 0, 0, 1.2, 0, -1.6, -1.6, -0.6, 1);

@@ -17,21 +17,10 @@ namespace {
 
 using namespace tolvol;
 using glm::dvec3;
+using shapes::flat, shapes::indices;
 using Crossed = PullBack::Crossings;
 
 constexpr double kTolerance = 0.02;
-
-std::vector<float> flat(const std::vector<dvec3>& points) {
-  std::vector<float> result;
-  for (const dvec3& p : points) result.insert(result.end(), {float(p.x), float(p.y), float(p.z)});
-  return result;
-}
-
-std::vector<std::uint32_t> indices(const TriangleMesh& mesh) {
-  std::vector<std::uint32_t> result;
-  for (const glm::uvec3& t : mesh.triangles) result.insert(result.end(), {t.x, t.y, t.z});
-  return result;
-}
 
 class Cancels {
  public:

@@ -29,24 +29,13 @@ struct Sculpture {
       : mesh(std::move(m)),
         to_world(matrix),
         volume(mesh.vertices, mesh.triangles, {to_world, Storage::float32}, kTolerance, {precision}),
-        positions(flat(mesh.vertices)) {}
+        positions(shapes::flat(mesh.vertices)) {}
   TriangleMesh mesh;
   glm::dmat4 to_world;
   ToleranceVolume volume;
   std::vector<float> positions;
 
-  static std::vector<float> flat(const std::vector<dvec3>& points) {
-    std::vector<float> result;
-    for (const dvec3& p : points) {
-      for (int k = 0; k < 3; ++k) result.push_back(float(p[k]));
-    }
-    return result;
-  }
-  std::vector<std::uint32_t> faces() const {
-    std::vector<std::uint32_t> result;
-    for (const glm::uvec3& t : mesh.triangles) result.insert(result.end(), {t.x, t.y, t.z});
-    return result;
-  }
+  std::vector<std::uint32_t> faces() const { return shapes::indices(mesh); }
   Guard guard(const Guard::Options& options = {}) const { return {positions, faces(), 3, to_world, volume, options}; }
   dvec3 at(std::size_t v) const { return {positions[3 * v], positions[3 * v + 1], positions[3 * v + 2]}; }
   void push(std::size_t v, const dvec3& by) {
@@ -127,7 +116,7 @@ TEST(Guard, AgreesWithConstrainButForTheLastFourPercentAlmostEverywhere) {
     std::size_t held = 0, apart = 0;
     Sculpture s;
     for (std::size_t centre = 50; centre < 1'600; centre += kSanitized ? 150 : 50) {
-      s.positions = Sculpture::flat(s.mesh.vertices);
+      s.positions = shapes::flat(s.mesh.vertices);
       Guard guard = s.guard({.two_sided = two_sided});
       const std::vector<dvec3> before = s.mesh.vertices;
       s.dab(centre, 0.5, 0.08);

@@ -124,14 +124,6 @@ TEST(MovingCrossings, ADeformationIsBlockedOrGoesAsFarAsNothingCrosses) {
   }
 }
 
-std::vector<float> flat(const std::vector<dvec3>& points) {
-  std::vector<float> result;
-  for (const dvec3& p : points) {
-    for (int k = 0; k < 3; ++k) result.push_back(float(p[k]));
-  }
-  return result;
-}
-
 std::vector<dvec3> points(const std::vector<float>& flat) {
   std::vector<dvec3> result;
   for (std::size_t i = 0; i < flat.size(); i += 3) result.emplace_back(flat[i], flat[i + 1], flat[i + 2]);

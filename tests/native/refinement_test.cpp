@@ -85,7 +85,7 @@ TEST(Refinement, KeepsTheOneDirectionThatIsAskedFor) {
 }
 
 TEST(Refinement, SubsetKeepsPositionsBitForBit) {
-  // Of the smoother torus of the other tests fast leaves as few triangles.
+  // On the smoother torus of the other tests fast leaves as few triangles as thorough.
   const Case c{shapes::torus(36, 0.02), glm::dmat4(1), Storage::float32, kPercent};
   Options options = thorough();
   options.placement = Options::Placement::subset;

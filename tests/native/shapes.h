@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <numbers>
 #include <random>
@@ -26,6 +27,20 @@ struct Random {
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform;
 };
+
+/// Three indices for each triangle, as operations on faces take them.
+inline std::vector<std::uint32_t> indices(const TriangleMesh& mesh) {
+  std::vector<std::uint32_t> result;
+  for (const glm::uvec3& t : mesh.triangles) result.insert(result.end(), {t.x, t.y, t.z});
+  return result;
+}
+
+/// The coordinates as a guard takes them.
+inline std::vector<float> flat(const std::vector<dvec3>& points) {
+  std::vector<float> result;
+  for (const dvec3& p : points) result.insert(result.end(), {float(p.x), float(p.y), float(p.z)});
+  return result;
+}
 
 /// Rounded to float32, as Blender would store it.
 inline TriangleMesh stored(TriangleMesh mesh) {

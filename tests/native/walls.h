@@ -16,6 +16,7 @@
 namespace tolvol::walls {
 
 using glm::dvec3;
+using shapes::flat, shapes::indices;
 using Crossed = PullBack::Crossings;
 
 inline const StoredSpace kSingle(glm::dmat4(1), Storage::float32);
@@ -28,12 +29,6 @@ inline Pairs pairs_of(std::span<const dvec3> vertices, std::span<const glm::uvec
   return pairs;
 }
 inline Pairs pairs_of(const TriangleMesh& mesh) { return pairs_of(mesh.vertices, mesh.triangles); }
-
-inline std::vector<std::uint32_t> indices(const TriangleMesh& mesh) {
-  std::vector<std::uint32_t> result;
-  for (const glm::uvec3& t : mesh.triangles) result.insert(result.end(), {t.x, t.y, t.z});
-  return result;
-}
 
 inline bool none_new(const Pairs& now, const Pairs& before) { return std::ranges::includes(before, now); }
 
