@@ -241,7 +241,7 @@ TEST(Certificate, AmongNeedlesSideBySideFewSearchesAreInVain) {
   TriangleMesh fans;
   std::mt19937 engine(6);
   std::uniform_real_distribution<double> u(0, 1);
-  const std::uint32_t count = 20'000;
+  const std::uint32_t count = many(20'000);
   for (const double y : {0.0, 1e-4}) {
     for (std::uint32_t i = 0; i < count; ++i) {
       const double x = static_cast<double>(i) / (count - 1);

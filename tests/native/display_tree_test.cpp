@@ -8,6 +8,7 @@
 #include <random>
 
 #include "geometry/hierarchy.h"
+#include "many.h"
 #include "polls.h"
 #include "shapes.h"
 
@@ -118,7 +119,7 @@ TEST(AreaShares, OfTheReferenceItselfNothingIsOutside) {
 // Two fans of needles between two lines, each from the far end of the other line. The boxes of half of the needles meet
 // in any place, and 85,000 searches would visit a thousand million nodes.
 TEST(AreaShares, OfAslantNeedlesAreEstimatedByFewerSamples) {
-  constexpr std::uint32_t kNeedles = 10000;
+  constexpr std::uint32_t kNeedles = many(10000);
   TriangleMesh strip;
   for (const double y : {0.0, 0.001}) {
     for (std::uint32_t i = 0; i <= kNeedles; ++i) strip.vertices.emplace_back(static_cast<double>(i) / kNeedles, y, 0);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/call.h"
+#include "many.h"
 #include "measure/hausdorff.h"
 #include "measures.h"
 #include "polls.h"
@@ -111,7 +112,7 @@ TEST(Hausdorff, FansTakeLittleForEachTriangle) {
 // Two fans whose common corners are at nearly the same place. Every search near the corner that all triangles share may
 // look at all of them, so that each of its pieces takes as much as hundreds of others.
 TEST(Hausdorff, PiecesAtACornerThatVeryManyShareCountForSeveral) {
-  constexpr unsigned kFaces = 4000;
+  constexpr unsigned kFaces = many(4000);
   TriangleMesh one;
   for (unsigned i = 0; i <= kFaces; ++i) {
     const double angle = 2 * std::numbers::pi * i / kFaces, x = std::cos(angle), y = std::sin(angle);

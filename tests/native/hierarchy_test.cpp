@@ -128,7 +128,7 @@ TEST(Hierarchy, LooksAtFewOfManyNeedles) {
 
 // Near the hub of a fan each needle is far narrower than at the rim, and so are the slices that a search looks at.
 TEST(Hierarchy, LooksAtFewNearTheHubOfAFan) {
-  const unsigned count = 20000;
+  const unsigned count = many(20000);
   const TriangleMesh mesh = needles(count, true);
   const Hierarchy hierarchy(mesh);
   shapes::Random random(22);
@@ -154,7 +154,7 @@ TEST(Hierarchy, LooksAtFewNearTheHubOfAFan) {
 
 // One of the edges at the hub may be much shorter than the other or have no length, or both may have any direction.
 TEST(Hierarchy, LooksAtFewNearTheHubOfUnequalEdges) {
-  const unsigned count = 20000;
+  const unsigned count = many(20000);
   shapes::Random random(23);
   for (const double shorter : {0.05, 0.0, 1.0}) {
     TriangleMesh mesh;

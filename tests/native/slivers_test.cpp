@@ -75,7 +75,7 @@ TEST(Slivers, AFaceAcrossSliversIsProvedInFewParts) {
 
 TEST(Slivers, ACylinderEndsNearItsOptimum) {
   // With both sides of the tolerance in use 42 sides would do: 168 triangles.
-  for (const unsigned sides : {400u, 800u}) {
+  for (const unsigned sides : {across(400), across(800)}) {
     const Case c = cylinder(sides, 0.05);
     const DecimationResult r = run(c, alone());
     cases::expect_within(c, r);
