@@ -157,7 +157,7 @@ bool TriangleCertificate::is_open(const glm::dvec3& p, const Facing* facing, con
     is_open = !(closest_point(p, a, b, c).distance_squared <= radius * radius);
     return is_open;
   };
-  for (const std::uint32_t triangle : {hints.x, hints.y, hints.z, grid_->triangle_near(p)}) {
+  for (const std::uint32_t triangle : {grid_->triangle_near(p), hints.x, hints.y, hints.z}) {
     if (triangle != Hierarchy::kNone && !visit(triangle)) return false;
   }
   hierarchy_->for_each_within(p, radius, visit, [&](std::uint32_t node) { return !facing || facing->may_admit(node); });

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Step (4) of pull_back.cpp: while the reference would lose faces as witnesses, or faces would cross that did not at
-// the start, the vertices of these faces go back, by a small share of the way first, and by a large one in a tangle.
-// What goes back may uncover a part of the reference that it covered, leave the volume as its neighbours go on, or meet
-// another face, so that all is asked again until all of it holds. In the state itself all of it does, so that this
-// comes to an end.
+// the start, the vertices of these faces go back, by a small share of the way first (by half of it in Mode::halve), and
+// by a large one in a tangle. What goes back may uncover a part of the reference that it covered, leave the volume as
+// its neighbours go on, or meet another face, so that all is asked again until all of it holds. In the state itself all
+// of it does, so that this comes to an end.
 #include <algorithm>
 #include <numeric>
 #include <stdexcept>
@@ -19,7 +19,7 @@ namespace tolvol {
 namespace {
 
 /// Where the reference would lose a witness or faces would cross, a factor shrinks by this share first, then by twice
-/// the share each time, and after half of it by kShrink.
+/// the share each time, and after half of it by kShrink. In Mode::halve it shrinks by kShrink each time.
 constexpr double kRetreat = 1.0 / 16;
 /// Where at least this many faces cross others, and they are more than half of those that move, the wish is a tangle.
 /// Each factor shrinks to the share kUntangle then: small steps would leave nearly all of them crossing, and every step
@@ -202,7 +202,7 @@ void PullBack::retreat(Held& held, Mode mode, double least, bool is_tangled) {
   } else if (is_tangled) {
     held.retreat = kShrink;
     held.factor *= kUntangle;
-  } else if (held.retreat < kShrink) {
+  } else if (mode != Mode::halve && held.retreat < kShrink) {
     held.retreat = held.retreat == 0 ? kRetreat : 2 * held.retreat;
     held.factor = held.factor_before * (1 - held.retreat);
   } else {

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <utility>
 
@@ -26,6 +27,9 @@ namespace tolvol {
 namespace {
 
 constexpr double kLaplacianStep = 0.5, kBilaplacianStep = 0.25;
+/// A vertex that was held back goes at most kGrowth times as far in the next iteration, but it may always go by this
+/// share of the tolerance. One that cannot move any more would otherwise be pulled back from afar in every iteration.
+constexpr double kGrowth = 2, kLeastReach = 1.0 / 16;
 /// The cotangent of 3 degrees.
 constexpr double kLargestCotangent = 19.1;
 
@@ -59,6 +63,10 @@ class Smoothing {
       moving_ = pull_back_->moving(std::move(moving));
     } else {
       moving_.vertices = std::move(moving);
+    }
+    if (pull_back_ && !options_.reset) {
+      reach_.assign(moving_.vertices.size(), std::numeric_limits<double>::infinity());
+      is_short_.assign(moving_.vertices.size(), 0);
     }
     if (options_.progress) options_.progress->begin("smoothing");
     for (unsigned i = 0; i < options_.iterations; ++i) {
@@ -255,6 +263,11 @@ class Smoothing {
       } else {
         step = kLaplacianStep * umbrella(v, positions_[v], [&](std::uint32_t other) { return positions_[other]; });
       }
+      if (!reach_.empty()) {
+        const double length = strength_[v] * glm::length(in_world(step));
+        is_short_[i] = length > reach_[i];
+        if (is_short_[i]) step *= reach_[i] / length;
+      }
       const glm::dvec3 to = positions_[v] + strength_[v] * step;
       before_[i] = positions_[v];
       after_[i] = space_.storage() == Storage::float32 ? rounded_to_float32(to) : to;
@@ -265,9 +278,25 @@ class Smoothing {
           moving_, before_, after_, options_.reset ? PullBack::Mode::reset : PullBack::Mode::halve, options_.progress);
       after_.swap(ends.reached);
       held_back = ends.held_back, kept_from_crossing = ends.kept_from_crossing;
+      if (!reach_.empty()) {
+        set_reach(ends.factors);
+        for (std::size_t i = 0; i < moving.size(); ++i) held_back += is_short_[i] && ends.factors[i] >= 1;
+      }
     }
     result_.held_back.push_back(held_back), result_.kept_from_crossing.push_back(kept_from_crossing);
     each(moving.size(), [&](std::uint32_t i) { positions_[moving[i]] = after_[i]; });
+  }
+
+  /// Sets how far the vertices may go in the next iteration, once it is known which share of their ways they went.
+  void set_reach(const std::vector<double>& factors) {
+    each(factors.size(), [&](std::uint32_t i) {
+      if (factors[i] < 1) {
+        const double went = glm::length(in_world(after_[i] - before_[i]));
+        reach_[i] = std::max(kGrowth * went, kLeastReach * volume_->tolerance());
+      } else {
+        reach_[i] *= kGrowth;
+      }
+    });
   }
 
   void write() {
@@ -300,7 +329,11 @@ class Smoothing {
   std::vector<std::uint32_t> faces_;
   std::unique_ptr<PullBack> pull_back_;  // Null without a volume.
   PullBack::Moving moving_;
-  std::vector<double> cotangents_;  // For each corner.
+  /// For each moving vertex: how far it may go in the next iteration, in world units. Empty where nothing is pulled
+  /// back.
+  std::vector<double> reach_;
+  std::vector<std::uint8_t> is_short_;  // For each moving vertex: whether that shortened its step in this iteration.
+  std::vector<double> cotangents_;      // For each corner.
   std::vector<glm::dvec3> umbrellas_, before_, after_;
 };
 

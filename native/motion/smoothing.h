@@ -57,12 +57,14 @@ struct SmoothingResult {
 /// A step of a vertex is half the umbrella vector (the weighted mean of its neighbours less itself), or, bilaplacian,
 /// less a quarter of the umbrella vector of these vectors: the largest at which no component of a shape overshoots. All
 /// new positions are computed from the old ones and then go as far as the tolerance lets them (PullBack), so that every
-/// iteration ends inside. What holds T-junctions together (topology/t_junctions.h) stays. `volume` null: without bound,
-/// and bit for bit what a volume that holds nothing back gives.
+/// iteration ends inside. After an iteration that held a vertex back, its next step is at most twice as long as the way
+/// that it went, or a sixteenth of the tolerance if that is more. What holds T-junctions together
+/// (topology/t_junctions.h) stays. `volume` null: without bound, and bit for bit what a volume that holds nothing back
+/// gives.
 ///
 /// Throws InvalidInput for a bad mesh or bad arrays, naming the first offender, and like constrain(); Cancelled. About
 /// 0.3 us an iteration and vertex, and some us for each that is held back; two-sided half as much again, and up to
-/// three and a half times as much if many are held back. [M. Desbrun, M. Meyer, P. Schröder, A. H. Barr, Implicit
+/// three times as much if many are held back. [M. Desbrun, M. Meyer, P. Schröder, A. H. Barr, Implicit
 /// Fairing of Irregular Meshes using Diffusion and Curvature Flow, 1999], [Botsch04, §5].
 SmoothingResult smooth(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                        const StoredSpace& space, const ToleranceVolume* volume, const SmoothingOptions& options);

@@ -112,7 +112,7 @@ def test_the_reference_stays_within_the_tolerance_unless_one_direction_is_asked_
     options = {"operator": "laplacian", "iterations": 30, "mode": mode}
     one, both = (tolvol.smooth(vertices, triangles, volume, two_sided=two, **options) for two in (False, True))
     reference = vertices, triangles
-    assert tolvol.hausdorff(one.vertices, triangles, *reference).forward.upper <= tolerance
+    assert tolvol.directed_hausdorff(one.vertices, triangles, *reference, bound=tolerance).upper <= tolerance
     assert tolvol.hausdorff(one.vertices, triangles, *reference).backward.lower > 1.1 * tolerance
     assert tolvol.hausdorff(both.vertices, triangles, *reference, bound=tolerance).upper <= tolerance
     assert 0.5 * tolerance < both.report["largest_motion"]
