@@ -157,6 +157,7 @@ bool TriangleCertificate::is_open(const glm::dvec3& p, const Facing* facing, con
     is_open = !(closest_point(p, a, b, c).distance_squared <= radius * radius);
     return is_open;
   };
+  // The hints belong to the corners, which may be far from p.
   for (const std::uint32_t triangle : {grid_->triangle_near(p), hints.x, hints.y, hints.z}) {
     if (triangle != Hierarchy::kNone && !visit(triangle)) return false;
   }

@@ -90,7 +90,8 @@ class TriangleCertificate {
 
   /// Returns one of at most 42 points of the triangle, none of them a corner, that is_open(), so that the triangle has
   /// no bound; or none if no point is. This takes a hundredth of the time of a proof for a large triangle, and finds
-  /// most triangles that have no proof. `hints` are triangles of the reference that are tried first.
+  /// most triangles that have no proof. `hints` are triangles of the reference that are tried before the hierarchy is
+  /// searched.
   std::optional<glm::dvec3> point_outside(const glm::dvec3 (&corners)[3], const Facing* facing = nullptr,
                                           const glm::uvec3& hints = glm::uvec3(Hierarchy::kNone)) const;
 
@@ -102,8 +103,9 @@ class TriangleCertificate {
   std::optional<glm::dvec3> nearest_point(const glm::dvec3& p, double radius, const Facing* facing) const;
 
   /// Tells whether p is farther than limit() from all triangles that `facing` admits, or from all if it is null, by
-  /// more than rounding. No triangle that contains p has a bound with such a `facing`. About 1 us, and 0.1 us near one
-  /// of the `hints`, triangles that are tried first.
+  /// more than rounding. No triangle that contains p has a bound with such a `facing`. About 1 us, and 0.1 us near the
+  /// triangle of the grid's nearest node or one of the `hints`, triangles that are tried before the hierarchy is
+  /// searched.
   bool is_open(const glm::dvec3& p, const Facing* facing, const glm::uvec3& hints = glm::uvec3(Hierarchy::kNone)) const;
 
   double limit() const { return limit_; }

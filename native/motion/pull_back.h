@@ -26,7 +26,7 @@ class PullBack {
   enum class Mode {
     pull_back,  ///< Each vertex goes as far as the tolerance lets it: none can rise by 1/64 of its motion alone.
     settle,     ///< The same, except for the last 4 % of the tolerance, which take most of the time.
-    halve,      ///< Factors are halved until all faces are inside: quick, for steps that are repeated.
+    halve,      ///< Factors are halved, in a tangle quartered, until all of it holds: quick, for repeated steps.
     reset,      ///< Vertices go all the way back or not at all, the one step back of [Botsch04, §5].
   };
 
@@ -109,7 +109,8 @@ class PullBack {
     /// About the factor at which the vertex itself leaves the volume, 1 only if it does not leave it. In Mode::settle,
     /// the factor that it is to reach.
     double largest_factor = 1;
-    /// The share of `factor_before` by which it went back for the reference or a crossing; kShrink if that was more.
+    /// In Mode::pull_back and Mode::settle: the share of `factor_before` by which it went back for the reference or a
+    /// crossing; kShrink if that was more, or after a tangle.
     double retreat = 0;
     double factor_before = 0;         ///< The factor before it did.
     bool kept_from_crossing = false;  ///< Whether it went back because of a crossing.
@@ -157,7 +158,8 @@ class PullBack {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
   /// When step (3) of pull_back.cpp ends in Mode::pull_back, no factor alone can rise by this much.
   static constexpr double kRise = 1.0 / 64;
-  /// A factor shrinks to this share in each round in which a face of the vertex fails.
+  /// A factor shrinks to this share in each round of step (2) in which a face of the vertex fails, and in step (4) as
+  /// retreat() says.
   static constexpr double kShrink = 0.5;
 
   MovingMesh mesh_;

@@ -19,7 +19,8 @@ namespace tolvol {
 namespace {
 
 /// Where the reference would lose a witness or faces would cross, a factor shrinks by this share first, then by twice
-/// the share each time, and after half of it by kShrink. In Mode::halve it shrinks by kShrink each time.
+/// the share each time, and after half of it by kShrink. In Mode::halve it shrinks to the share kShrink each
+/// time, but for a tangle.
 constexpr double kRetreat = 1.0 / 16;
 /// Where at least this many faces cross others, and they are more than half of those that move, the wish is a tangle.
 /// Each factor shrinks to the share kUntangle then: small steps would leave nearly all of them crossing, and every step
@@ -93,7 +94,8 @@ void PullBack::back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Pr
       if (held_index_[v] == kNone) hold(v, wish, held).factor = 1;
       Held& h = held[held_index_[v]];
       h.kept_from_crossing = h.kept_from_crossing || cross;
-      retreat(h, is_hasty ? Mode::reset : mode, cross ? kRise : little(h), is_tangled);
+      const double least = !cross ? little(h) : mode == Mode::halve ? std::max(kRise, little(h)) : kRise;
+      retreat(h, is_hasty ? Mode::reset : mode, least, is_tangled);
     }
     if (!next_twin_.empty()) hold_twins(wish, std::vector(changed), held, changed);
     if (coverage_) went_back.insert(went_back.end(), changed.begin(), changed.end());
@@ -196,13 +198,13 @@ void PullBack::widen(std::vector<std::uint32_t>& vertices, std::size_t rings) {
 /// Sends a vertex back by the next share of its way, a large one in a tangle, or all the way where less than `least`
 /// would be left.
 void PullBack::retreat(Held& held, Mode mode, double least, bool is_tangled) {
-  if (held.retreat == 0) held.factor_before = held.factor;
   if (mode == Mode::reset) {
     held.factor = 0;
   } else if (is_tangled) {
     held.retreat = kShrink;
     held.factor *= kUntangle;
   } else if (mode != Mode::halve && held.retreat < kShrink) {
+    if (held.retreat == 0) held.factor_before = held.factor;
     held.retreat = held.retreat == 0 ? kRetreat : 2 * held.retreat;
     held.factor = held.factor_before * (1 - held.retreat);
   } else {

@@ -27,9 +27,11 @@ namespace tolvol {
 namespace {
 
 constexpr double kLaplacianStep = 0.5, kBilaplacianStep = 0.25;
-/// A vertex that was held back goes at most kGrowth times as far in the next iteration, but it may always go by this
-/// share of the tolerance. One that cannot move any more would otherwise be pulled back from afar in every iteration.
-constexpr double kGrowth = 2, kLeastReach = 1.0 / 16;
+/// A vertex that was pulled back goes at most so many times as far in the next iteration. One that cannot move any more
+/// would otherwise be pulled back from afar in every iteration.
+constexpr double kGrowth = 2;
+/// It may always go by this share of the tolerance.
+constexpr double kLeastReach = 1.0 / 16;
 /// The cotangent of 3 degrees.
 constexpr double kLargestCotangent = 19.1;
 
@@ -66,7 +68,7 @@ class Smoothing {
     }
     if (pull_back_ && !options_.reset) {
       reach_.assign(moving_.vertices.size(), std::numeric_limits<double>::infinity());
-      is_short_.assign(moving_.vertices.size(), 0);
+      is_shortened_.assign(moving_.vertices.size(), 0);
     }
     if (options_.progress) options_.progress->begin("smoothing");
     for (unsigned i = 0; i < options_.iterations; ++i) {
@@ -265,8 +267,8 @@ class Smoothing {
       }
       if (!reach_.empty()) {
         const double length = strength_[v] * glm::length(in_world(step));
-        is_short_[i] = length > reach_[i];
-        if (is_short_[i]) step *= reach_[i] / length;
+        is_shortened_[i] = length > reach_[i];
+        if (is_shortened_[i]) step *= reach_[i] / length;
       }
       const glm::dvec3 to = positions_[v] + strength_[v] * step;
       before_[i] = positions_[v];
@@ -280,7 +282,8 @@ class Smoothing {
       held_back = ends.held_back, kept_from_crossing = ends.kept_from_crossing;
       if (!reach_.empty()) {
         set_reach(ends.factors);
-        for (std::size_t i = 0; i < moving.size(); ++i) held_back += is_short_[i] && ends.factors[i] >= 1;
+        // A vertex that went all of a shortened step did not go all the way.
+        for (std::size_t i = 0; i < moving.size(); ++i) held_back += is_shortened_[i] && ends.factors[i] >= 1;
       }
     }
     result_.held_back.push_back(held_back), result_.kept_from_crossing.push_back(kept_from_crossing);
@@ -329,11 +332,11 @@ class Smoothing {
   std::vector<std::uint32_t> faces_;
   std::unique_ptr<PullBack> pull_back_;  // Null without a volume.
   PullBack::Moving moving_;
-  /// For each moving vertex: how far it may go in the next iteration, in world units. Empty where nothing is pulled
-  /// back.
+  /// For each moving vertex: how far it may go in the next iteration, in world units. Empty without a volume, and with
+  /// `reset`.
   std::vector<double> reach_;
-  std::vector<std::uint8_t> is_short_;  // For each moving vertex: whether that shortened its step in this iteration.
-  std::vector<double> cotangents_;      // For each corner.
+  std::vector<std::uint8_t> is_shortened_;  // For each moving vertex: whether its reach shortened its step.
+  std::vector<double> cotangents_;          // For each corner.
   std::vector<glm::dvec3> umbrellas_, before_, after_;
 };
 

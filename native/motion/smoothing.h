@@ -56,15 +56,16 @@ struct SmoothingResult {
 
 /// A step of a vertex is half the umbrella vector (the weighted mean of its neighbours less itself), or, bilaplacian,
 /// less a quarter of the umbrella vector of these vectors: the largest at which no component of a shape overshoots. All
-/// new positions are computed from the old ones and then go as far as the tolerance lets them (PullBack), so that every
-/// iteration ends inside. After an iteration that held a vertex back, its next step is at most twice as long as the way
-/// that it went, or a sixteenth of the tolerance if that is more. What holds T-junctions together
-/// (topology/t_junctions.h) stays. `volume` null: without bound, and bit for bit what a volume that holds nothing back
-/// gives.
+/// new positions are computed from the old ones, and vertices are pulled back (PullBack) until all promises hold, so
+/// that every iteration ends inside. Unless `reset`: once an iteration has pulled a vertex back, its steps have a
+/// limit, at first twice the way that it went, or a sixteenth of the tolerance if that is more. Each iteration that
+/// does not pull it back doubles the limit. A longer step is shortened to the limit, and its vertex counts in
+/// `held_back`. What holds T-junctions together (topology/t_junctions.h) stays. `volume` null: without bound, and bit
+/// for bit what a volume that holds nothing back gives.
 ///
 /// Throws InvalidInput for a bad mesh or bad arrays, naming the first offender, and like constrain(); Cancelled. About
-/// 0.3 us an iteration and vertex, and some us for each that is held back; two-sided half as much again, and up to
-/// three times as much if many are held back. [M. Desbrun, M. Meyer, P. Schröder, A. H. Barr, Implicit
+/// 0.3 us an iteration and vertex, and some us for each that is held back; two-sided 1.1 to 1.3 times as much, and
+/// more if it holds more vertices back. [M. Desbrun, M. Meyer, P. Schröder, A. H. Barr, Implicit
 /// Fairing of Irregular Meshes using Diffusion and Curvature Flow, 1999], [Botsch04, §5].
 SmoothingResult smooth(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                        const StoredSpace& space, const ToleranceVolume* volume, const SmoothingOptions& options);

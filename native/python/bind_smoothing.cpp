@@ -144,9 +144,10 @@ locked : (n,) bool array, optional
 strength : (n,) float64 array, optional
     From 0 to 1: the share of a full step that each vertex goes.
 mode : {"pull_back", "reset"}
-    A vertex that would leave the tolerance is pulled back along its step until the faces around it are inside; its next
-    step is then at most twice as long as the way that it went, or a sixteenth of the tolerance if that is more. Or it
-    stays where it is for this iteration.
+    "pull_back" pulls a vertex back along its step where the tolerance, the angle or a crossing asks for it. Its next
+    step is then at most twice as long as the way that it went, or a sixteenth of the tolerance if that is more. This
+    limit doubles with each iteration in which the vertex is not pulled back. Vertices whose steps are shortened by it
+    count in `held_back`, too. "reset" leaves a vertex that would be pulled back where it is for this iteration.
 two_sided : bool
     False keeps the distance from the mesh to the reference alone: parts of the reference may be farther from the mesh.
 outside : {"error", "keep"}
@@ -176,8 +177,8 @@ Cancelled
 Notes
 -----
 Cost: about 0.3 us for each vertex in each iteration, and some us for each vertex that is held back. Two-sided, 2 us for
-each face of a reference that is not the input, and half as much again for each iteration; up to three times as much if
-many vertices are held back. Keeping crossings out costs 2 us for each triangle, and 3 us in each iteration
+each face of a reference that is not the input, and 1.1 to 1.3 times as much for each iteration, or more if more
+vertices are held back. Keeping crossings out costs 2 us for each triangle, and 3 us in each iteration
 for each triangle whose corners came so far that it could cross others: usually a few in a hundred.
 
 After M. Desbrun et al., Implicit Fairing of Irregular Meshes using Diffusion and Curvature Flow, 1999. "reset" is from

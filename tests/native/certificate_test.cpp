@@ -188,7 +188,7 @@ TEST(Certificate, ProvesLargeFacesOverTrianglesOfAnySize) {
   }
 }
 
-TEST(Certificate, APointOutsideIsSoughtAmongTheHintsFirst) {
+TEST(Certificate, APointOutsideIsSoughtAmongTheHintsBeforeTheHierarchy) {
   // Among triangles as large as the cube that they fill, a search looks at a share of all of them, and polls.
   TriangleMesh tangle;
   shapes::Random random(2);

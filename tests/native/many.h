@@ -15,7 +15,8 @@ inline constexpr bool kSanitized = true;
 inline constexpr bool kSanitized = false;
 #endif
 
-/// So many, or an eighth under the sanitizers: they are ten times as slow, and what they look for any few show.
+/// So many, or an eighth under the sanitizers, which are ten times as slow: they look for faults of memory and threads,
+/// and the ordinary build holds the limits of work.
 constexpr int many(int count) { return kSanitized ? count / 8 : count; }
 
 /// So many squares along a side of a mesh, or half of them under the sanitizers: the ordinary build holds the

@@ -305,18 +305,49 @@ TEST(Smoothing, PulledBackGoesFartherThanReset) {
   EXPECT_GT(moved(false), 1.02 * moved(true));
 }
 
-TEST(Smoothing, VerticesThatCannotMoveTakeFewStepsInBothDirections) {
-  // An edge of the box is rounded by the tolerance in the first iterations, and would go on by ten times as much.
+TEST(Smoothing, VerticesThatCannotMoveTakeLittleWorkInBothDirections) {
+  // In the first iterations the edges of the box are rounded until they are at the tolerance. From then on their
+  // vertices wish for steps that are several times as long as the tolerance.
   const TriangleMesh mesh = shapes::box(12);
   const ToleranceVolume volume(mesh.vertices, mesh.triangles, kSingle, 0.004);
-  const auto steps = [&](bool two_sided) {
+  const auto polls = [&](bool two_sided) {
     const Options options{.iterations = 30, .two_sided = two_sided, .threads = 1};
     return polls_of([&] {
       const SmoothingResult r = smooth(mesh.vertices, mesh.triangles, kSingle, &volume, options);
       EXPECT_GT(r.held_back.back(), 300u);
     });
   };
-  EXPECT_LT(steps(true), 4.5 * steps(false)) << "it is 6.8 times if each iteration pulls them back from their wishes";
+  EXPECT_LT(polls(true), 4.5 * polls(false)) << "6.8 times without a limit of their steps";
+}
+
+TEST(Smoothing, WhatWasPulledBackGoesAtMostTwiceAsFarNext) {
+  glm::dmat4 stretched(1);
+  stretched[0][0] = 3;  // The limit is a length of the world.
+  const StoredSpace space(stretched, Storage::float64);
+  const TriangleMesh mesh = shapes::box(8);
+  const double tolerance = 0.004, least = tolerance / 16;
+  const ToleranceVolume volume(mesh.vertices, mesh.triangles, space, tolerance);
+  const auto way = [&](const dvec3& a, const dvec3& b) { return glm::length(space.world(b) - space.world(a)); };
+  // Runs of n and of n + 1 iterations begin alike, and a free iteration of a state gives the wish in it.
+  std::vector<std::vector<dvec3>> at{mesh.vertices}, wish{{}};
+  std::size_t limited = 0, went_on = 0;
+  for (unsigned n = 1; n <= 12; ++n) {
+    const SmoothingResult r = smooth(mesh.vertices, mesh.triangles, space, &volume, {.iterations = n});
+    wish.push_back(free_smooth({at.back(), mesh.triangles}, {.iterations = 1}, space).vertices);
+    at.push_back(r.vertices);
+    std::size_t held_back = 0;
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+      held_back += at[n][v] != wish[n][v];
+      if (n < 2 || at[n - 1][v] == wish[n - 1][v]) continue;
+      const double before = way(at[n - 2][v], at[n - 1][v]), now = way(at[n - 1][v], at[n][v]);
+      EXPECT_LE(now, (1 + 1e-9) * std::max(2 * before, least));
+      limited += way(at[n - 1][v], wish[n][v]) > 2 * std::max(2 * before, least);
+      went_on += before == 0 && now > 0;
+    }
+    EXPECT_EQ(r.held_back.back(), held_back);
+  }
+  EXPECT_GT(limited, 0u);
+  EXPECT_GT(went_on, 0u) << "a vertex that did not move at all may try again";
 }
 
 TEST(Smoothing, TheResultDoesNotDependOnThreads) {
