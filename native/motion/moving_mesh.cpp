@@ -16,10 +16,14 @@
 namespace tolvol {
 namespace {
 
-/// A share of the provable distance. The certificate proves a face that is nearer than it whatever the face's shape,
-/// because the parts that it splits into become smaller than the rest of the distance. So every face that is settled
-/// without the certificate is one that the certificate could prove.
+/// A share of the provable distance. The certificate proves a face that is nearer than it, because the parts that it
+/// splits into become smaller than the rest of the distance. Therefore it need not be asked about such a face.
 constexpr double kEasy = 0.98;
+/// In provable distances: a longer face is settled by the certificate alone. Such parts along all of its length could
+/// be more than the certificate looks at.
+constexpr double kLongestEasy = 1000;
+/// The points of a mesh are nearer than this to each other in the frame, unless the tolerance is larger than the mesh.
+constexpr double kLongestInFrame = 4;
 /// Distances are known up to this multiple of the provable distance.
 constexpr double kKnown = 2;
 /// A bound on the rounding of distances in the frame.
@@ -64,6 +68,20 @@ MovingMesh::PointBound MovingMesh::bound_at(std::uint32_t vertex, const glm::dve
   return found;
 }
 
+/// Whether the face is too long on trial to be settled without the certificate.
+bool MovingMesh::is_too_long(std::uint32_t face) const {
+  const double longest = kLongestEasy * limit_;
+  if (longest > kLongestInFrame) return false;
+  const std::span<const std::uint32_t> corners = corners_of(face);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      const glm::dvec3 side = trial_[corners[k]].at - trial_[corners[i]].at;
+      if (glm::dot(side, side) > longest * longest) return true;
+    }
+  }
+  return false;
+}
+
 MovingMesh::FaceBound MovingMesh::bound_by_motion(std::uint32_t face) const {
   double step = 0;
   for (const std::uint32_t v : corners_of(face)) step = std::max(step, step_[v]);
@@ -74,7 +92,7 @@ MovingMesh::FaceBound MovingMesh::bound_by_motion(std::uint32_t face) const {
     return bound;
   }
   const double distance = (distance_[face] + step) * (1 + kRoundUp);
-  if (!(distance <= kEasy * limit_)) return bound;
+  if (!(distance <= kEasy * limit_) || is_too_long(face)) return bound;
   if (facing_) {
     bound.facing.room = facing_->room(face) - step;
     if (!(bound.facing.room > 0)) {

@@ -164,6 +164,7 @@ class MovingMesh {
     MovingFacing::Known facing;
   };
   using TriangleCorners = glm::dvec3[3];
+  bool is_too_long(std::uint32_t face) const;
   FaceBound bound_by_motion(std::uint32_t face) const;
   FaceBound bound_by_certificate(std::uint32_t face, Blame* blame = nullptr) const;
   double distance_by(const TriangleCertificate& certificate, std::uint32_t face, MovingFacing::Known& facing,

@@ -174,3 +174,17 @@ def test_threads_change_nothing(volume):
 def test_bad_input(change, message):
     with pytest.raises(tolvol.InvalidInput, match=message):
         tolvol.smooth(**{"vertices": VERTICES, "triangles": TRIANGLES, "volume": VOLUME, **change})
+
+
+def test_within_a_tiny_tolerance_each_face_can_be_proved_again():
+    """Two were not: a face is 100,000 times as long as the tolerance, so that its parts were more than a proof looks at."""
+    vertices, triangles = meshes.misoriented()
+    vertices = vertices.astype(np.float32)
+    to_world = meshes.matrix([[-2.268, -0.55, -1.885], [0.198, -0.446, -0.108], [0.521, 0.413, -0.747]])
+    tolerance = 1.2e-7 * np.linalg.norm(np.ptp(meshes.transform(to_world, vertices), axis=0))
+    volume = tolvol.ToleranceVolume(vertices, triangles, tolerance, to_world=to_world)
+    smoothed = tolvol.smooth(
+        vertices, triangles, volume, to_world=to_world, iterations=4, threads=1, two_sided=False
+    ).vertices
+    assert not np.array_equal(smoothed, vertices)
+    assert (volume.check(smoothed, triangles, to_world=to_world).verdicts == tolvol.Verdict.INSIDE).all()
