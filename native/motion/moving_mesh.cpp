@@ -10,6 +10,7 @@
 #include "base/call.h"
 #include "base/parallel.h"
 #include "geometry/closest_point.h"
+#include "geometry/lengths.h"
 #include "motion/finite.h"
 #include "motion/selection.h"
 
@@ -19,11 +20,9 @@ namespace {
 /// A share of the provable distance. The certificate proves a face that is nearer than it, because the parts that it
 /// splits into become smaller than the rest of the distance. Therefore it need not be asked about such a face.
 constexpr double kEasy = 0.98;
-/// In provable distances: a longer face is settled by the certificate alone. Such parts along all of its length could
-/// be more than the certificate looks at.
+/// In provable distances: a longer face is settled by the certificate alone. So small parts along all of its length
+/// could be more than the certificate looks at.
 constexpr double kLongestEasy = 1000;
-/// The points of a mesh are nearer than this to each other in the frame, unless the tolerance is larger than the mesh.
-constexpr double kLongestInFrame = 4;
 /// Distances are known up to this multiple of the provable distance.
 constexpr double kKnown = 2;
 /// A bound on the rounding of distances in the frame.
@@ -71,12 +70,13 @@ MovingMesh::PointBound MovingMesh::bound_at(std::uint32_t vertex, const glm::dve
 /// Whether the face is too long on trial to be settled without the certificate.
 bool MovingMesh::is_too_long(std::uint32_t face) const {
   const double longest = kLongestEasy * limit_;
-  if (longest > kLongestInFrame) return false;
+  // No face in the volume is longer than this.
+  const double largest = (volume_->diagonal() + 2 * volume_->tolerance()) * volume_->frame().scale();
+  if (longest > largest) return false;
   const std::span<const std::uint32_t> corners = corners_of(face);
   for (std::size_t i = 0; i < corners.size(); ++i) {
     for (std::size_t k = 0; k < i; ++k) {
-      const glm::dvec3 side = trial_[corners[k]].at - trial_[corners[i]].at;
-      if (glm::dot(side, side) > longest * longest) return true;
+      if (squared_length(trial_[corners[k]].at - trial_[corners[i]].at) > longest * longest) return true;
     }
   }
   return false;

@@ -26,7 +26,7 @@ class PullBack {
   enum class Mode {
     pull_back,  ///< Each vertex goes as far as the tolerance lets it: none can rise by 1/64 of its motion alone.
     settle,     ///< The same, except for the last 4 % of the tolerance, which take most of the time.
-    halve,      ///< Factors are halved, in a tangle quartered, until all of it holds: quick, for repeated steps.
+    halve,      ///< Factors are halved, in a tangle quartered, until the promises of move() hold: for repeated steps.
     reset,      ///< Vertices go all the way back or not at all, the one step back of [Botsch04, §5].
   };
 

@@ -19,8 +19,8 @@ namespace tolvol {
 namespace {
 
 /// Where the reference would lose a witness or faces would cross, a factor shrinks by this share first, then by twice
-/// the share each time, and after half of it by kShrink. In Mode::halve it shrinks to the share kShrink each
-/// time, but for a tangle.
+/// the share each time, and after half of it by kShrink. In Mode::halve it shrinks to the share kShrink each time, but
+/// for a tangle.
 constexpr double kRetreat = 1.0 / 16;
 /// Where at least this many faces cross others, and they are more than half of those that move, the wish is a tangle.
 /// Each factor shrinks to the share kUntangle then: small steps would leave nearly all of them crossing, and every step
@@ -94,7 +94,9 @@ void PullBack::back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Pr
       if (held_index_[v] == kNone) hold(v, wish, held).factor = 1;
       Held& h = held[held_index_[v]];
       h.kept_from_crossing = h.kept_from_crossing || cross;
-      const double least = !cross ? little(h) : mode == Mode::halve ? std::max(kRise, little(h)) : kRise;
+      double least = cross ? kRise : little(h);
+      // A repeated step does not have to use up the last of the tolerance.
+      if (mode == Mode::halve) least = std::max(least, little(h));
       retreat(h, is_hasty ? Mode::reset : mode, least, is_tangled);
     }
     if (!next_twin_.empty()) hold_twins(wish, std::vector(changed), held, changed);

@@ -65,8 +65,8 @@ struct SmoothingResult {
 ///
 /// Throws InvalidInput for a bad mesh or bad arrays, naming the first offender, and like constrain(); Cancelled. About
 /// 0.3 us an iteration and vertex, and 30 to 120 us for each that is held back; two-sided 1.1 to 1.3 times as much, and
-/// more if it holds more vertices back. [M. Desbrun, M. Meyer, P. Schröder, A. H. Barr, Implicit
-/// Fairing of Irregular Meshes using Diffusion and Curvature Flow, 1999], [Botsch04, §5].
+/// more if it holds more vertices back. [M. Desbrun, M. Meyer, P. Schröder, A. H. Barr, Implicit Fairing of Irregular
+/// Meshes using Diffusion and Curvature Flow, 1999], [Botsch04, §5].
 SmoothingResult smooth(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                        const StoredSpace& space, const ToleranceVolume* volume, const SmoothingOptions& options);
 

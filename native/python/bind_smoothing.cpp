@@ -176,8 +176,8 @@ Cancelled
 
 Notes
 -----
-Cost: about 0.3 us for each vertex in each iteration, and 30 to 120 us for each vertex that is held back. Two-sided, 2 us for
-each face of a reference that is not the input, and 1.1 to 1.3 times as much for each iteration, or more if more
+Cost: about 0.3 us for each vertex in each iteration, and 30 to 120 us for each vertex that is held back. Two-sided, 2 us
+for each face of a reference that is not the input, and 1.1 to 1.3 times as much for each iteration, or more if more
 vertices are held back. Keeping crossings out costs 2 us for each triangle, and 3 us in each iteration for each triangle
 whose corners came so far that it could cross others: usually a few in a hundred.
 

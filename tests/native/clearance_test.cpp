@@ -16,7 +16,7 @@ using glm::dvec3;
 
 struct Scene {
   explicit Scene(TriangleMesh m) : mesh(std::move(m)), volume(mesh.vertices, mesh.triangles, space, 0.1) {
-    for (const glm::uvec3& t : mesh.triangles) indices.insert(indices.end(), {t.x, t.y, t.z});
+    indices = shapes::indices(mesh);
     moving = std::make_unique<MovingMesh>(volume, space, indices, 3, mesh.vertices.size(), 1);
     for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) faces.push_back(f);
     Team alone(1);

@@ -49,7 +49,7 @@ TEST(Constrain, OutsideIsAnErrorOrKept) {
   before[7] = rounded_to_float32(before[7]);
   const Points wish = scene.wish(noise(0.1));
   const auto volume = scene.volume();
-  const std::vector<std::uint32_t> faces = flat(scene.mesh.triangles);
+  const std::vector<std::uint32_t> faces = shapes::indices(scene.mesh);
   const std::vector<Verdict> found = verdicts(*volume, scene.space(), before, faces);
   const auto first = std::find_if(found.begin(), found.end(), [](Verdict v) { return v != Verdict::inside; });
   const std::ptrdiff_t count = std::count_if(first, found.end(), [](Verdict v) { return v != Verdict::inside; });

@@ -126,7 +126,7 @@ TEST(Constrain, OnlyVerticesOfFailingFacesAreHeldBack) {
   const Points wish = scene.wish(noise(0.5));
   const ConstrainResult r = run(scene, wish, {.max_normal_angle = 180});
   const std::vector<Verdict> wished =
-      verdicts(*scene.volume(1 - 2e-4), scene.space(), wish, flat(scene.mesh.triangles));
+      verdicts(*scene.volume(1 - 2e-4), scene.space(), wish, shapes::indices(scene.mesh));
   const auto ring = rings(scene);
   std::size_t untouched = 0;
   for (std::size_t v = 0; v < wish.size(); ++v) {

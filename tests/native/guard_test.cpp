@@ -289,12 +289,6 @@ TriangleMesh square(double bend, bool is_cut_otherwise = false) {
   return mesh;
 }
 
-std::vector<std::uint32_t> faces_of(const TriangleMesh& mesh) {
-  std::vector<std::uint32_t> faces;
-  for (const glm::uvec3& t : mesh.triangles) faces.insert(faces.end(), {t.x, t.y, t.z});
-  return faces;
-}
-
 TEST(Guard, ReplacedFacesAreKeptFromThenOn) {
   Sculpture s(square(0));
   Guard guard = s.guard();
@@ -316,9 +310,9 @@ TEST(Guard, FacesThatAreOutsideOrLeaveTheReferenceUncoveredAreNotTaken) {
   // The middle of the other diagonal is half of the bend above that of this one.
   for (const bool two_sided : {false, true}) {
     Sculpture near(square(0.8 * kTolerance)), far(square(8 * kTolerance));
-    EXPECT_TRUE(near.guard({.two_sided = two_sided}).replace_faces(faces_of(square(0, true))).empty());
+    EXPECT_TRUE(near.guard({.two_sided = two_sided}).replace_faces(shapes::indices(square(0, true))).empty());
     Guard guard = far.guard({.two_sided = two_sided});
-    EXPECT_EQ(guard.replace_faces(faces_of(square(0, true))), (std::vector<std::uint32_t>{0, 1}));
+    EXPECT_EQ(guard.replace_faces(shapes::indices(square(0, true))), (std::vector<std::uint32_t>{0, 1}));
     far.push(3, {0, 0, 0.5});
     far.correct(guard.constrain(far.positions));
     EXPECT_LE(far.deviation(), kTolerance) << "it goes on with the faces from before";
@@ -371,9 +365,9 @@ TEST(Guard, FacesThatTurnOverOrCrossAreNotTaken) {
   Sculpture pierced(mesh);
   TriangleMesh otherwise = mesh;
   otherwise.triangles[0] = {0, 1, 3}, otherwise.triangles[1] = {1, 2, 3};
-  EXPECT_TRUE(pierced.guard().replace_faces(faces_of(otherwise)).empty());
+  EXPECT_TRUE(pierced.guard().replace_faces(shapes::indices(otherwise)).empty());
   Guard guard = pierced.guard({.crossings = PullBack::Crossings::keep_out});
-  EXPECT_FALSE(guard.replace_faces(faces_of(otherwise)).empty());
+  EXPECT_FALSE(guard.replace_faces(shapes::indices(otherwise)).empty());
   // The boxes of the faces from before are looked at again: the needle may not go down through them.
   pierced.push(4, {0, 0, -2 * z}), pierced.push(5, {0, 0, -2 * z});
   EXPECT_FALSE(guard.constrain(pierced.positions).vertices.empty());
@@ -414,9 +408,9 @@ TEST(Guard, WhatIsNearestToAnUncoveredPartIsNotReplaced) {
   for (const dvec3& p : {dvec3(2, 0, 0), {2, 1, 0}}) reference.vertices.push_back(p);
   reference.triangles.emplace_back(1, 4, 5), reference.triangles.emplace_back(1, 5, 2);
   Sculpture s(reference);
-  Guard guard(s.positions, faces_of(square(0)), 3, s.to_world, s.volume, {.outside = Outside::keep});
+  Guard guard(s.positions, shapes::indices(square(0)), 3, s.to_world, s.volume, {.outside = Outside::keep});
   ASSERT_GT(guard.start().uncovered.faces, 0u);
-  EXPECT_FALSE(guard.replace_faces(faces_of(square(0, true))).empty());
+  EXPECT_FALSE(guard.replace_faces(shapes::indices(square(0, true))).empty());
 }
 
 TEST(Guard, BadFacesKeepTheFaces) {
@@ -426,7 +420,7 @@ TEST(Guard, BadFacesKeepTheFaces) {
   EXPECT_THROW(guard.replace_faces({0, 1, 2, 0, 2, 4}), InvalidInput);
   Progress cancelled;
   cancelled.cancel();
-  EXPECT_THROW(guard.replace_faces(faces_of(square(0, true)), &cancelled), Cancelled);
+  EXPECT_THROW(guard.replace_faces(shapes::indices(square(0, true)), &cancelled), Cancelled);
   s.push(1, {0, 0, 0.5}), s.push(3, {0, 0, 0.5});
   s.correct(guard.constrain(s.positions));
   EXPECT_LE(s.deviation(), kTolerance);

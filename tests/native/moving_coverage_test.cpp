@@ -29,9 +29,7 @@ TriangleMesh needle() {
 struct Scene {
   explicit Scene(TriangleMesh reference, std::vector<std::uint32_t> faces = {}, int corners = 3)
       : mesh(std::move(reference)), indices(std::move(faces)) {
-    if (indices.empty()) {
-      for (const glm::uvec3& t : mesh.triangles) indices.insert(indices.end(), {t.x, t.y, t.z});
-    }
+    if (indices.empty()) indices = shapes::indices(mesh);
     volume = std::make_unique<ToleranceVolume>(mesh.vertices, mesh.triangles, space, kTolerance);
     moving = std::make_unique<MovingMesh>(*volume, space, indices, corners, mesh.vertices.size(), 1);
     moving->start(mesh.vertices, 180, {}, nullptr);
@@ -75,8 +73,7 @@ std::size_t polls_from_afar(const TriangleMesh& reference) {
   for (dvec3& p : moved.vertices) p += 2 * kTolerance * random.point();
   const StoredSpace space{glm::dmat4(1), Storage::float64};
   const ToleranceVolume volume(reference.vertices, reference.triangles, space, kTolerance);
-  std::vector<std::uint32_t> faces;
-  for (const glm::uvec3& t : moved.triangles) faces.insert(faces.end(), {t.x, t.y, t.z});
+  const std::vector<std::uint32_t> faces = shapes::indices(moved);
   MovingMesh moving(volume, space, faces, 3, moved.vertices.size(), 1);
   moving.start(moved.vertices, 180, {}, nullptr);
   return polls_of([&] {

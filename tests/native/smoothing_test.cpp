@@ -280,8 +280,7 @@ TEST(Smoothing, EveryResultIsInsideOnEveryMesh) {
           hausdorff(world(r.vertices), world(scene.mesh.vertices), {.bound = tolerance, .threads = 1, .narrow = false})
               .upper,
           tolerance);
-      std::vector<std::uint32_t> indices;
-      for (const glm::uvec3& t : scene.mesh.triangles) indices.insert(indices.end(), {t.x, t.y, t.z});
+      const std::vector<std::uint32_t> indices = shapes::indices(scene.mesh);
       for (const Verdict v : Certificate(volume).check({r.vertices, scene.space(), indices}, {1, nullptr}))
         ASSERT_EQ(v, Verdict::inside);
       for (const dvec3& p : r.vertices) ASSERT_EQ(p, rounded_to_float32(p));

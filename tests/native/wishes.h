@@ -34,15 +34,9 @@ struct Scene : PlacedMesh {
   }
 };
 
-inline std::vector<std::uint32_t> flat(const std::vector<glm::uvec3>& triangles) {
-  std::vector<std::uint32_t> indices;
-  for (const glm::uvec3& t : triangles) indices.insert(indices.end(), {t.x, t.y, t.z});
-  return indices;
-}
-
 inline ConstrainResult run(const Scene& scene, const ToleranceVolume& volume, const Points& wish,
                            const ConstrainOptions& options) {
-  return constrain(scene.mesh.vertices, wish, flat(scene.mesh.triangles), 3, scene.space(), volume, options);
+  return constrain(scene.mesh.vertices, wish, shapes::indices(scene.mesh), 3, scene.space(), volume, options);
 }
 
 inline ConstrainResult run(const Scene& scene, const Points& wish, const ConstrainOptions& options = {}) {
@@ -80,7 +74,7 @@ inline void expect_inside(const Scene& scene, const ToleranceVolume& volume, con
   if (two_sided) {
     EXPECT_LE(distance(before, after), tolerance);
   }
-  EXPECT_TRUE(all_inside(verdicts(volume, scene.space(), r.vertices, flat(scene.mesh.triangles))));
+  EXPECT_TRUE(all_inside(verdicts(volume, scene.space(), r.vertices, shapes::indices(scene.mesh))));
 }
 
 inline void expect_inside(const Scene& scene, const ConstrainResult& r, bool two_sided) {
