@@ -46,6 +46,32 @@ TEST(MovingCrossings, ATangleGoesBackInFewRounds) {
   EXPECT_TRUE(pairs_of(end.vertices, motion.mesh.triangles).empty());
 }
 
+TEST(MovingCrossings, SmoothingHoldsAVertexWhereLittleOfTheToleranceIsLeftOfItsStep) {
+  const Motion motion(hollow(6, 0.03), 0.3);
+  const std::size_t count = motion.mesh.vertices.size();
+  const auto locked = std::make_unique<bool[]>(count);
+  for (std::size_t v = count / 2; v < count; ++v) locked[v] = true;
+  SmoothingOptions options{.kind = SmoothingOptions::Operator::laplacian, .locked = {locked.get(), count}};
+  const auto run = [&](const std::vector<dvec3>& from, unsigned iterations, const ToleranceVolume* volume) {
+    options.iterations = iterations;
+    return smooth(from, motion.mesh.triangles, kSingle, volume, options);
+  };
+  std::vector<dvec3> before = motion.mesh.vertices;
+  std::size_t held = 0;
+  for (unsigned n = 1; n <= 12; ++n) {
+    const std::vector<dvec3> wish = run(before, 1, nullptr).vertices;
+    const SmoothingResult now = run(motion.mesh.vertices, n, &motion.volume);
+    for (std::size_t v = 0; v < count / 2; ++v) {
+      if (now.vertices[v] == wish[v]) continue;
+      ++held;
+      const double went = glm::length(now.vertices[v] - before[v]);
+      EXPECT_TRUE(went == 0 || went > 0.029 * motion.tolerance) << n << ' ' << v << ' ' << went;
+    }
+    before = now.vertices;
+  }
+  EXPECT_GT(held, 20u);
+}
+
 TEST(MovingCrossings, SmoothingKeepsWallsApart) {
   // The outer sphere shrinks towards the inner one, which stays.
   const Motion motion(hollow(6, 0.03), 0.3);
