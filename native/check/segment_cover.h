@@ -10,12 +10,12 @@
 namespace tolvol {
 
 /// A cover along a segment may exceed the provable distance by this share of witness_error(). The error of a distance
-/// is 47 u (R + d) as derived there, and a point of the segment is placed once, not cut 32 times, which errs by 5.2 u
-/// more. This leaves 203 of the 256 u.
+/// is 47 u (R + d) as derived there, and a point of the segment is placed once, not cut 64 times, which errs by 5.2 u
+/// more. This leaves 459 of the 512 u.
 ///
-/// The share is needed to find again what another search has proved. Parts of a larger piece lie up to 32 * 3 u (1 + d)
-/// from the piece, where |x| <= 1 + d as in a frame, and the distances of their witnesses err by 47 u, together 143 u.
-/// The rest of the 192 u is for the error of the distances that are computed here.
+/// The share is needed to find again what another search has proved. Parts of a larger piece lie up to 64 * 3 u (1 + d)
+/// from the piece, where |x| <= 1 + d as in a frame, and the distances of their witnesses err by 47 u, together 239 u.
+/// The rest of the 384 u is for the error of the distances that are computed here.
 inline constexpr double kCoverShare = 0.75;
 
 /// Tells whether every point of the segment from a to b is within the tolerance of one of the triangles, which are in

@@ -74,8 +74,8 @@ void witness_distances(const WitnessTriangle& triangle, const FourPoints& points
 /// edge bc, whose witness is b + w bc, needs one more subtraction. All this is below u (4 M + 14 R). An accepted |p| is
 /// at most sqrt(3) R + d, so that M <= 2.74 R + d and the sum is below 25 u (R + d). The length over three coordinates
 /// is sqrt(3) times as much. The sum of three squares has a relative error of at most 4u and the squared threshold of
-/// 2u, which moves d by 3u d. 25 sqrt(3) + 3 < 47. Cutting up pieces (part.h) adds 32 * 5.2 < 167. 256 is a power of
+/// 2u, which moves d by 3u d. 25 sqrt(3) + 3 < 47. Cutting up pieces (part.h) adds 64 * 5.2 < 333. 512 is a power of
 /// two.
-inline double witness_error(double magnitude) { return 256 * kUnitRoundoff * magnitude; }
+inline double witness_error(double magnitude) { return 512 * kUnitRoundoff * magnitude; }
 
 }  // namespace tolvol

@@ -203,15 +203,17 @@ void MovingCrossings::test(std::uint32_t face, std::vector<glm::uvec2>& failed) 
   });
 }
 
-/// Does so for a face that is not known to fail, with another one that is and may therefore have left out this pair.
-void MovingCrossings::test_against_failed(std::uint32_t face, std::vector<glm::uvec2>& failed) const {
+/// Adds to `failed` pairs that test() left out, because the one that would have looked at them fails anyway: of this face
+/// and others, one of which fails and the other one does not.
+void MovingCrossings::test_left_out(std::uint32_t face, std::vector<glm::uvec2>& failed) const {
+  const bool fails = failed_[face] == now_;
   std::size_t looked_at = 0;
   for_each_near(face, [&](std::uint32_t other) {
     if (++looked_at % 64 == 0) poll();
-    if (failed_[other] != now_ || asked_[other] != now_ || other == face) return true;
-    if (looks_at(face, other) || !cross_anew(face, other)) return true;
+    if (asked_[other] != now_ || (failed_[other] == now_) == fails) return true;
+    if (!(fails ? looks_at(face, other) : looks_at(other, face)) || !cross_anew(face, other)) return true;
     failed.emplace_back(face, other);
-    return false;
+    return fails;
   });
 }
 
@@ -252,8 +254,10 @@ std::vector<std::uint32_t> MovingCrossings::failing(std::span<const std::uint32_
   };
   look([&](std::uint32_t face, std::vector<glm::uvec2>& pairs) { test(face, pairs); });
   if (result.empty()) return result;
+  // Either those that fail look for the others or the others for them: the fewer do.
+  const bool failing_look = result.size() < asked.size() / 2;
   look([&](std::uint32_t face, std::vector<glm::uvec2>& pairs) {
-    if (failed_[face] != now_) test_against_failed(face, pairs);
+    if ((failed_[face] == now_) == failing_look) test_left_out(face, pairs);
   });
   std::sort(result.begin(), result.end());
   return result;

@@ -79,7 +79,7 @@ class MovingCrossings {
   bool any_pair(std::uint32_t a, std::uint32_t b, Pair&& pair) const;
   bool cross_anew(std::uint32_t a, std::uint32_t b) const;
   void test(std::uint32_t face, std::vector<glm::uvec2>& failed) const;
-  void test_against_failed(std::uint32_t face, std::vector<glm::uvec2>& failed) const;
+  void test_left_out(std::uint32_t face, std::vector<glm::uvec2>& failed) const;
   void build();
 
   std::size_t face_count() const { return faces_.size() / corners_; }

@@ -52,11 +52,28 @@ double gap_along(const dvec3& u, const Pair& pair) {
   return std::max(b_after_a, a_after_b) - (4 * kRounding * most + kSmallest);
 }
 
+/// Of the edges of both, the longest one.
+dvec3 longest_edge(const Pair& pair) {
+  dvec3 longest(0);
+  double most2 = 0;
+  for (const auto* t : {&pair.a, &pair.b}) {
+    for (int k = 0; k < 3; ++k) {
+      const dvec3 edge = (*t)[k == 2 ? 0 : k + 1] - (*t)[k];
+      if (const double length2 = squared_length(edge); length2 > most2) longest = edge, most2 = length2;
+    }
+  }
+  return longest;
+}
+
 /// Calls visit(direction) for the directions along which they may be apart, until it returns true.
 template <class Visit>
 void for_each_direction(const Pair& pair, Visit&& visit) {
   const auto& [a, b, size] = pair;
-  if (visit(b[0] + b[1] + b[2] - (a[0] + a[1] + a[2]))) return;
+  const dvec3 between = b[0] + b[1] + b[2] - (a[0] + a[1] + a[2]);
+  if (visit(between)) return;
+  // A needle, or a segment, and a triangle beside it are apart along the way between them at right angles to it.
+  const dvec3 along = longest_edge(pair);
+  if (visit(squared_length(along) * between - glm::dot(along, between) * along)) return;
   const dvec3 normal_a = glm::cross(a[1] - a[0], a[2] - a[0]), normal_b = glm::cross(b[1] - b[0], b[2] - b[0]);
   if (visit(normal_a) || visit(normal_b)) return;
   for (int k = 0; k < 3; ++k) {

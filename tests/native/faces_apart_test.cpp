@@ -103,6 +103,23 @@ TEST(FacesApart, NeighboursOnAFlatSurfaceAreToldApartWithoutExactArithmetic) {
   EXPECT_GT(sure, pairs * 95 / 100);
 }
 
+// The boxes of long segments and needles meet those of very many faces.
+TEST(FacesApart, ASegmentAndATriangleBesideItAreToldApartWithoutExactArithmetic) {
+  shapes::Random random(7);
+  for (const double width : {0.0, 1e-3}) {
+    std::size_t pairs = 0, sure = 0;
+    for (int i = 0; i < 20'000; ++i) {
+      const dvec3 end = random.point(), other = random.point(), place = random.point();
+      const Corners needle{end, other, other + width * random.point()};
+      const Corners triangle{place, place + 0.1 * random.point(), place + 0.1 * random.point()};
+      if (!meet(box_of(needle), box_of(triangle)) || faces_cross(needle, triangle)) continue;
+      ++pairs, sure += surely_uncrossed(needle, triangle);
+    }
+    EXPECT_GT(pairs, 1'000u);
+    EXPECT_GT(sure, pairs * 97 / 100) << width << ": " << sure << " of " << pairs;
+  }
+}
+
 TEST(FacesApart, WhatIsApartFromAFanCrossesNoFaceOfIt) {
   shapes::Random random(5);
   std::size_t apart = 0, seen = 0, cross = 0;
