@@ -188,3 +188,15 @@ def test_within_a_tiny_tolerance_each_face_can_be_proved_again():
     ).vertices
     assert not np.array_equal(smoothed, vertices)
     assert (volume.check(smoothed, triangles, to_world=to_world).verdicts == tolvol.Verdict.INSIDE).all()
+
+
+def test_within_a_tiny_tolerance_the_reference_can_be_covered_again():
+    """Smoothing was refused after constrain(): parts of the reference had to be cut more than 32 times."""
+    vertices, triangles = meshes.torus(24, 12, noise=0.02, seed=5)
+    tolerance = 4e-7 * np.linalg.norm(np.ptp(vertices, axis=0))
+    volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
+    for seed in range(2):
+        wish = vertices + np.random.default_rng(seed).standard_normal(vertices.shape) * tolerance
+        constrained = tolvol.constrain(vertices, wish, triangles, volume).vertices
+        smoothed = tolvol.smooth(constrained, triangles, volume, iterations=1).vertices
+        assert not np.array_equal(smoothed, constrained)
