@@ -10,6 +10,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "runners"))
 
+import clang_tidy
 import passes
 import run
 import tasks
@@ -100,3 +101,25 @@ def test_a_task_that_its_program_decides_is_not_run_again(tmp_path, monkeypatch,
         file.write(b"changed")
     passes.hash_of.cache_clear()
     assert [number_of_runs(), number_of_runs()] == [11, 11]
+
+
+@pytest.mark.parametrize(
+    "line, said",
+    [
+        ("", ""),
+        ("int f(int* p) { return p == 0 ? 1 : 2; }", "modernize-use-nullptr"),
+        ("using std::pair;", "pair is not used"),
+        ("namespace other = std;", "other is not used"),
+    ],
+)
+def test_clang_tidy_finds_in_joined_sources_what_it_finds_in_each(tmp_path, capfd, line, said):
+    shutil.copy(clang_tidy.ROOT / ".clang-tidy", tmp_path)
+    sources = [tmp_path / "native" / name for name in ("one.cpp", "two.cpp")]
+    sources[0].parent.mkdir()
+    for source in sources:
+        source.write_text("#include <utility>\nusing std::swap;\nvoid two(int& a, int& b) { swap(a, b); }\n")
+    sources[0].write_text(f"#include <utility>\n{line}\n")
+    joined = tmp_path / "joined.cxx"
+    joined.write_text("".join(f'#include "{source}"\n' for source in sources))
+    assert clang_tidy.is_passed(clang_tidy.Unit(joined, sources, ["-std=c++20"], [])) == (not said)
+    assert said in capfd.readouterr().out
