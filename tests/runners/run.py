@@ -3,7 +3,8 @@
 window tests.
 
 The window tests mostly wait, so they run beside the compilation of the sanitizer presets and beside the queue. A task of
-`asan` is left out if it has passed with the same program before, except in a full run.
+`native` or `asan` whose program decides what it finds is left out if it has passed with the same program before, except in a
+full run.
 """
 
 import argparse

@@ -81,8 +81,8 @@ def count_checks(output):
 def native(runner, preset, name, program="tolvol_tests", only="*", environment=None):
     command = (f"build/{preset}/tests/native/{program}", "--gtest_brief=1", f"--gtest_filter={only}")
     built = "" if preset == "release" else preset
-    # The tests of the sanitizer presets read no file and use no GPU. What tsan sees depends on how the threads meet.
-    decides = command[0] if preset == "asan" else ""
+    # These tests read no file and use no GPU, as those of tolvol_gl_tests do. What tsan sees depends on how the threads meet.
+    decides = command[0] if program == "tolvol_tests" and preset != "tsan" else ""
     return Task(runner, name, command, count_gtest, environment or {}, built, program, decides)
 
 
@@ -152,7 +152,7 @@ def tidy(everything):
 def planned(runners, everything):
     """Returns the tasks of these runners; with `everything` those of sh tests/run.sh --all."""
     tasks = {
-        "native": [*shares("native", "release", 4, everything)],
+        "native": [*shares("native", "release", 4, everything), native("native", "release", "gl", "tolvol_gl_tests")],
         "asan": [*shares("asan", "asan", 6)],
         "tsan": [*(shares("tsan", "tsan", 6) if everything else threaded())],
         "python": [*python(), *(python_with_addresses_checked() if everything else ())],
