@@ -30,12 +30,16 @@ class Writing:
 
     prepare() builds a scratch mesh, which lives as long as the context. After that, `layout` tells where the result is in
     the written mesh. Only write() changes the mesh.
+
+    compact: make the scratch mesh anew at the end, without the memory of what was removed from it. It is for those who
+    prepare several results of one mesh before they write the first.
     """
 
-    def __init__(self, mesh, source, result):
+    def __init__(self, mesh, source, result, compact=False):
         self._mesh = mesh
         self._source = source
         self._result = result
+        self._is_compact = compact
 
     def __enter__(self):
         self._built = bmesh.new()
@@ -68,7 +72,10 @@ class Writing:
         yield
         _turn(built, verts, faces, result)
         _weld(built, verts, present, targets, loose)
-        self.layout = _compare(_scratch_arrays(built), source, result, targets)
+        if self._is_compact:
+            self._built = built.copy()
+            built.free()
+        self.layout = _compare(_scratch_arrays(self._built), source, result, targets)
         yield
 
     def prepare_at_once(self):
@@ -77,7 +84,7 @@ class Writing:
             pass
 
     def made_anew(self, mesh):
-        """Takes the mesh that Blender has made in place of the present one, with the same content, when it undid a step."""
+        """Takes another mesh with the same content as the present one: Blender makes all anew when it undoes a step."""
         self._mesh = mesh
 
     def write(self):

@@ -7,7 +7,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from .. import preferences
-from ..job import WRITE, JobOperator, breathe
+from ..job import WRITE, JobOperator
 from ..mesh import transfer
 from ..operation_settings import PROTECTED, decimate_settings, threads_setting
 from ..proof import verdict
@@ -126,7 +126,7 @@ object. An object without a reference gets one first, as by Set Reference"""
         outcomes = yield from self.each(tasks)
         with contextlib.ExitStack() as stack:
             # All are prepared, which checks that Blender can hold all results, before the first mesh is changed.
-            writes = yield from self._prepared(stack, outcomes)
+            writes = yield from decimation.prepared(self, stack, lambda: self._writes(outcomes))
             yield WRITE
             for ob, write in zip(self.objects, writes):
                 write.made_anew(ob.data)
@@ -140,27 +140,8 @@ object. An object without a reference gets one first, as by Set Reference"""
         options = decimation.options(self, placement, self.threads or preferences.threads(context))
         return decimation.task(ob, surface, reference, tolerance, self, options)
 
-    def _prepared(self, stack, outcomes):
-        """A generator for steps(): returns the prepared Writing of each object, in contexts of the stack."""
-        self.doing = "Writing"
-        self.edited()  # What was changed until now is read below.
-        writes = self._writes(stack, outcomes)
-        for write in writes:
-            for _ in write.prepare():
-                yield breathe
-        if self.edited():
-            # The user may have shaded the mesh meanwhile, say. It is read again, and nothing can come between now.
-            stack.close()
-            writes = self._writes(stack, outcomes)
-            for write in writes:
-                write.prepare_at_once()
-        return writes
-
-    def _writes(self, stack, outcomes):
-        return [
-            stack.enter_context(transfer.Writing(ob.data, source, result))
-            for ob, (source, _, result, _) in zip(self.objects, outcomes)
-        ]
+    def _writes(self, outcomes):
+        return [transfer.Writing(ob.data, source, result) for ob, (source, _, result, _) in zip(self.objects, outcomes)]
 
     def finish(self, outcomes, writes):
         with contextlib.ExitStack() as stack:

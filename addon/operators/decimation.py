@@ -3,6 +3,7 @@
 
 import math
 
+from ..job import breathe
 from ..mesh import mesh_io, protect
 from ..proof import kept_warnings, last_run, verdict
 from ..reference import measurements, snapshots
@@ -49,6 +50,27 @@ def task(ob, surface, reference, tolerance, settings, asked):
     if made.shares is not None:
         made.locked |= made.shares == 0
     return made
+
+
+def prepared(operator, stack, writings):
+    """A generator for steps(): returns the prepared transfer.Writing of each outcome, in contexts of the stack.
+
+    writings: a function that makes the Writings. If a mesh of the operator changes meanwhile, it is called again.
+    """
+    operator.doing, operator.part = "Writing", ""
+    operator.edited()  # What was changed until now is read below.
+    writes = [stack.enter_context(write) for write in writings()]
+    for i, write in enumerate(writes):
+        operator.share = i / len(writes)
+        for _ in write.prepare():
+            yield breathe
+    if operator.edited():
+        # The user may have shaded the mesh meanwhile, say. It is read again, and nothing can come between now.
+        stack.close()
+        writes = [stack.enter_context(write) for write in writings()]
+        for write in writes:
+            write.prepare_at_once()
+    return writes
 
 
 def keep(operator, ob, outcome, layout, said):

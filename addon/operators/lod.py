@@ -77,8 +77,10 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
         shared.take(self, self.ob.tolvol.lod, lod_settings())
         names = [(f"Level {i + 1} of {self.levels}", f"Level {i + 1}") for i in range(self.levels)]
         outcomes = yield from self.each(self._tasks(context), names)
-        yield WRITE
-        self._write(context, outcomes)
+        with contextlib.ExitStack() as stack:
+            writes = yield from decimation.prepared(self, stack, lambda: self._writes(outcomes))
+            yield WRITE
+            self._write(context, outcomes, writes)
 
     def _tasks(self, context):
         ob = self.ob
@@ -127,19 +129,21 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
                 )
         return limits
 
-    def _write(self, context, outcomes):
+    def _writes(self, outcomes):
+        source = _source(self.ob)
+        return [transfer.Writing(source, arrays, result, compact=True) for arrays, _, result, _ in outcomes]
+
+    def _write(self, context, outcomes, writes):
         """Makes the objects of all levels, or none of them."""
         ob = self.ob
         with contextlib.ExitStack() as undo:
-            meshes, layouts = [], []
+            meshes = []
             undo.callback(lambda: [bpy.data.meshes.remove(mesh) for mesh in meshes])
             source = _source(ob)
-            for arrays, _, result, _ in outcomes:
+            for write in writes:
                 meshes.append(source.copy())
-                with transfer.Writing(meshes[-1], arrays, result) as writing:
-                    writing.prepare_at_once()
-                    writing.write()
-                layouts.append(writing.layout)
+                write.made_anew(meshes[-1])
+                write.write()
             if ob.tolvol.snapshot is None:
                 undo.callback(snapshots.clear_reference, ob)
                 snapshots.set_reference(ob, outcomes[0][1])
@@ -148,7 +152,7 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
         collection = bpy.data.collections.new(f"{ob.name}_LODs")
         context.scene.collection.children.link(collection)
         levels, runs = [], [run for _, _, _, run in outcomes]
-        for i, (mesh, layout, outcome, run) in enumerate(zip(meshes, layouts, outcomes, runs)):
+        for i, (mesh, write, outcome, run) in enumerate(zip(meshes, writes, outcomes, runs)):
             level = ob.copy()
             levels.append(level)
             level.name = mesh.name = f"{ob.name}_LOD{i + 1}"
@@ -158,7 +162,7 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             self._set(level.tolvol, i, run["tolerance"]["absolute"])
             level[GEOMETRIC_ERROR] = max(run["forward"][1], run["backward"][1])
             context.view_layer.update()
-            decimation.keep(self, level, outcome, layout, f"{level.name}: ")
+            decimation.keep(self, level, outcome, write.layout, f"{level.name}: ")
         earlier = chain(ob)[1:]
         # An earlier level that is shown in place of the object gives way to it.
         if ob.hide_get() and any(level.visible_get() for level in earlier):

@@ -8,6 +8,7 @@ import scenes
 from addon import job, panels
 from panels_open import unfolded
 from test_panel import assert_proved, monkey, stored, suzanne
+from test_writing import paused
 from window import (
     at_rest,
     centre,
@@ -85,3 +86,15 @@ def test_escape_in_a_chain_leaves_nothing():
                 key("Escape")
             yield from finished(lambda: not job.under_way())
     assert not levels() and suzanne().tolvol.snapshot is None and len(bpy.data.meshes) == meshes
+
+
+def test_escape_while_the_levels_are_written_leaves_nothing():
+    yield from reset(monkey)
+    meshes, before, said = len(bpy.data.meshes), stored(), status_texts()
+    with unfolded(panels.TOLVOL_PT_lod), paused():
+        yield from open_tab()
+        yield from press("tolvol.make_lods")
+        yield from finished(lambda: any(text.startswith("Writing") for text in said))
+        key("Escape")
+        yield from finished(lambda: not job.under_way())
+    assert not levels() and suzanne().tolvol.snapshot is None and len(bpy.data.meshes) == meshes and stored() == before
