@@ -74,6 +74,9 @@ def _prepare(name):
         tolerance = tolerances.required(ob, reference.size())
     except Refused as error:
         return _fail(name, str(error))
+    if measurements.recognise(ob, surface, tolerance):  # It was measured before its mode changed, say.
+        redraw_views()
+        return None
     threads = preferences.threads(bpy.context)
 
     def compare(progress):

@@ -131,8 +131,8 @@ package.module = module
 # The add-on's own sentences for errors of the package by their code, where the package's sentences name its options.
 _SENTENCES = {
     "input_outside": "{count:,} faces are not within the tolerance of the reference, the first is face {first}; take a "
-    "larger tolerance, replace the reference, or choose Outside: Keep, which Decimate has under Advanced. Select Outside "
-    "shows these faces, once the reference is set",
+    "larger tolerance, replace the reference, or choose Outside: Keep, which Decimate has under Advanced. If a reference "
+    "is set, Select Outside shows these faces",
     "reference_outside": "{count:,} faces of the reference are not within the tolerance of the mesh, the first is face "
     "{first}; take a larger tolerance, tick Close if the mesh has holes, replace the reference, or set Keep to One Way",
 }

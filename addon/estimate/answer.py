@@ -15,7 +15,7 @@ from . import known, runs
 
 # *Thorough* leaves about this share of the triangles that *Fast* leaves, if Fast removes this share of them or more.
 _THOROUGH, _MANY = 0.63, 0.25
-_AT_WORK, _TOO_LARGE = "Estimating", "Too large to estimate"
+_AT_WORK, _TOO_LARGE, _OTHER_MODE = "Estimating", "Too large to estimate", "Decimate needs Object Mode"
 # A float32 tolerance in percent differs from that of the run by a smaller share.
 _SAME = 1e-6
 
@@ -36,7 +36,7 @@ def shown(context):
     objects = targets(context)
     if job.under_way() or any(blocked.decimate_blocked(ob) for ob in objects):
         runs.cancel()
-        return ""
+        return "" if job.under_way() or objects[0].mode == "OBJECT" else _OTHER_MODE
     settings = objects[0].tolvol
     done = [_decimated(ob, settings) for ob in objects]
     if all(done):

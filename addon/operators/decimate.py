@@ -106,6 +106,7 @@ object. An object without a reference gets one first, as by Set Reference"""
         column.prop(self, "tolerance_mode", text=" ")
         layout.prop(self, "keep")
         draw_decimate_settings(layout, self)
+        layout.label(text="Protect")
         draw_protect_settings(context, layout, self, context.active_object)
         draw_advanced_settings(context, layout, self)
 

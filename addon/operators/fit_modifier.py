@@ -119,7 +119,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
                 self._found.append((len(arrays.triangles), value))
                 fewest = min(self._found)[0]
                 than = f", {triangles:,} before the fit" if fewest > triangles else ""
-                self.count = f"{fewest:,} triangles so far{than}"
+                self.count = f"{fewest:,} triangles so far, not proved{than}"
         return sorted(self._found)
 
     def _refuse(self, context, name, parameter, trial):

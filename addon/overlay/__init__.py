@@ -17,7 +17,7 @@ from ..proof import labels as kept_labels
 from ..proof import places, probing
 from ..redraw import redraw_views
 from ..reference import snapshots
-from . import coloured, draw, field, labels, legend, markers, moving, reasons, shaders, shares
+from . import annotations, coloured, draw, field, legend, moving, reasons, shaders, shares
 from .surface import Surface
 
 _surfaces = {}  # name of an object that shows its deviation -> Surface
@@ -36,8 +36,7 @@ def refresh():
     """
     if not preferences.use_gl(bpy.context):
         reasons.broken.clear()  # When drawing is turned on again, the driver is tried again.
-    markers.refresh()
-    labels.refresh()
+    annotations.refresh()
     names = _wanted()
     if not names:
         _end()
@@ -139,19 +138,16 @@ def register():
     moving.register()
     bpy.app.handlers.load_post.append(_forget_places)
     snapshots.listeners.append(refresh)
-    places.listeners.append(markers.refresh)
-    for listeners in (kept_labels.listeners, probing.listeners):
-        listeners.append(labels.refresh)
+    for kept in (places, kept_labels, probing):
+        kept.listeners.append(annotations.refresh)
 
 
 def unregister():
     bpy.app.handlers.load_post.remove(_forget_places)
     places.forget()
-    places.listeners.remove(markers.refresh)
-    markers.end()
-    for listeners in (kept_labels.listeners, probing.listeners):
-        listeners.remove(labels.refresh)
-    labels.end()
+    for kept in (places, kept_labels, probing):
+        kept.listeners.remove(annotations.refresh)
+    annotations.end()
     snapshots.listeners.remove(refresh)
     _end()
     moving.unregister()

@@ -58,6 +58,8 @@ class Page:
     def __init__(self, context, signed=True, palette="SAFE"):
         self.scale = context.preferences.system.ui_scale
         self.region = context.region.width, context.region.height
+        left, right, _ = free_part(context)
+        self.room = right - left  # in which a line of text has to fit
         theme = context.preferences.themes[0].user_interface.wcol_tooltip
         self.ink, self.paper = tuple(theme.text), tuple(theme.inner)
         self.signed, self.palette = signed, palette
@@ -193,8 +195,8 @@ def _labels(context, colours, row):
 
 def _place(context, width, height, scale):
     """Returns left and bottom of the legend, or None if it would take too much of the view."""
-    right, low = free_part(context)
-    if width > _MOST_WIDTH * right or height > _MOST_HEIGHT * (context.region.height - low):
+    left, right, low = free_part(context)
+    if width > _MOST_WIDTH * (right - left) or height > _MOST_HEIGHT * (context.region.height - low):
         return None
     return _corner(context, width, height, _MARGIN * scale)
 
@@ -240,16 +242,19 @@ def percent(share):
 
 
 def free_part(context):
-    """Returns (right, bottom): the edges of the part of the view that no other region covers, in pixels of the region."""
-    region, right, bottom = context.region, context.region.width, 0
+    """Returns (left, right, bottom): the edges of the part of the view that neither the toolbar nor the sidebar nor what is
+    below covers, in pixels of the region."""
+    region, left, right, bottom = context.region, 0, context.region.width, 0
     for other in context.area.regions:
         if other == region or other.width <= 1 or other.height <= 1:
             continue
         if other.alignment == "RIGHT" and other.type == "UI":
             right = min(right, other.x - region.x)
+        elif other.alignment == "LEFT" and other.type == "TOOLS":
+            left = max(left, other.x + other.width - region.x)
         elif other.alignment == "BOTTOM" and other.y <= region.y + bottom:
             bottom = max(bottom, other.y + other.height - region.y)
-    return right, bottom
+    return left, right, bottom
 
 
 # Pointer of a 3D view -> where the user has put its legend: the share of the free way from the left and from below.
@@ -306,8 +311,9 @@ def forget_moved():
 
 def _room(context, width, height, margin):
     """Returns the least left and bottom that a box may have in the free part of the view, and how far it may go from there."""
-    right, low = free_part(context)
-    return (margin, low + margin), (right - width - 2 * margin, context.region.height - low - height - 2 * margin)
+    left, right, low = free_part(context)
+    room = right - left - width - 2 * margin, context.region.height - low - height - 2 * margin
+    return (left + margin, low + margin), room
 
 
 def _corner(context, width, height, margin):

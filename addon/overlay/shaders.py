@@ -26,13 +26,17 @@ vec4 displayed(vec3 colour, float opacity) {
 }
 """
 
-# The vertex shader computes the same two products as Blender's own shaders, so that the depths agree up to rounding.
-# NEARER moves the surface towards the eye by more than this rounding: by some steps of a depth buffer of 24 bits.
+# The vertex shader computes the same two products as Blender's own shaders, so that the depths agree up to rounding. The
+# surface is moved towards the eye by more than this: by NEARER, some steps of a depth buffer of 24 bits, and by STEPS times
+# the rounding of the products, which is large in a close view of an object that is far from the origin.
 _SURFACE_VERTEX = """
 void main() {
   place = framed;
-  gl_Position = told.view_projection * vec4((told.model * vec4(position, 1.0)).xyz, 1.0);
-  gl_Position.z -= NEARER * gl_Position.w;
+  mat4 m = told.view_projection;
+  vec3 world = (told.model * vec4(position, 1.0)).xyz;
+  gl_Position = m * vec4(world, 1.0);
+  vec4 summed = abs(m[0] * world.x) + abs(m[1] * world.y) + abs(m[2] * world.z) + abs(m[3]);
+  gl_Position.z -= NEARER * gl_Position.w + STEPS * 6e-8 * (summed.z + summed.w);
 }
 """
 
@@ -127,6 +131,7 @@ def _info(varying, attributes, vertex, fragment, shared=()):
     info.vertex_out(interface)
     info.fragment_out(0, "VEC4", "shown")
     info.push_constant("BOOL", "srgbTarget")
+    info.define("STEPS", "4.0")
     for name, colour in zip(("OUTSIDE", "STRIPE"), native.module.OUTSIDE_COLOURS):
         info.define(name, f"vec3({', '.join(f'{level / 255:.4f}' for level in colour)})")
     info.vertex_source(vertex)

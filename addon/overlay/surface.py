@@ -91,13 +91,18 @@ class Surface(Triangles):
         if not recut and np.array_equal(co, self.vertices):
             return
         if recut:
-            triangles = mesh_io.loop_triangles(mesh)
-            self.triangles = self.all_triangles = mesh_io.column(triangles, "vertices", 3, np.int32)
+            found = mesh_io.loop_triangles(mesh)
+            triangles = all_triangles = mesh_io.column(found, "vertices", 3, np.int32)
             if hides:
                 hidden = mesh_io.column(mesh.polygons, "hide", 1, bool)
-                self.triangles = self.triangles[~hidden[mesh_io.column(triangles, "polygon_index", 1, np.int32)]]
+                triangles = triangles[~hidden[mesh_io.column(found, "polygon_index", 1, np.int32)]]
             self._polygons = len(mesh.polygons)
             self._recut = False
+            # An undo step, and a label, leave the mesh as it is.
+            now = co, triangles, all_triangles
+            if all(map(np.array_equal, now, (self.vertices, self.triangles, self.all_triangles))):
+                return
+            self.triangles, self.all_triangles = triangles, all_triangles
             self._buffers.clear()
         self.vertices = co
         self.changes += 1

@@ -116,7 +116,7 @@ class TOLVOL_PT_objects(SubPanel, bpy.types.Panel):
         rows = verdicts(_listed(context))
         column, narrow = self.layout.column(align=True), is_narrow(context)
         for name, word, share in rows[:_MOST_LISTED]:
-            row = column.split(factor=0.6 if narrow else 0.5)
+            row = column.split(factor=0.6 if narrow or share is not None else 0.5)
             row.label(text=name, icon=_ICONS_OF[word])
             if share is None:
                 right(row, "\u2013" if narrow else word)  # A narrow sidebar has no room for both words of NOT CHECKED.
@@ -164,9 +164,10 @@ class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):
         column = self.layout.column()
         column.active = ob.tolvol.show_deviation
         column.row().prop(ob.tolvol, "deviation_surface", expand=True)
-        row = column.row()
-        row.enabled = not reasons.unsigned(ob)
-        row.prop(ob.tolvol, "deviation_kind", expand=True)
+        if reason := reasons.unsigned(ob):
+            column.label(text=wrapped(context, reason, most=1)[0])
+        else:
+            column.row().prop(ob.tolvol, "deviation_kind", expand=True)
         column.prop(ob.tolvol, "deviation_opacity")
         legend = column.column()
         legend.use_property_split, legend.use_property_decorate = True, False
@@ -182,7 +183,8 @@ class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):
 
 # As in the legend.
 _SIGNS = {probing.OUTSIDE: "+", probing.INSIDE: "\u2212"}
-_BESIDE_ICON = 0.5  # the part of the sidebar that an icon and the buttons leave to the text of a label
+# The parts of the sidebar that an icon and the buttons, and the share and the buttons, leave to the text of a label.
+_BESIDE_ICON, _BESIDE_SHARE = 0.5, 0.45
 
 
 class TOLVOL_UL_labels(bpy.types.UIList):
@@ -195,13 +197,13 @@ class TOLVOL_UL_labels(bpy.types.UIList):
         text = f"{index + 1}:  {_SIGNS.get(label.side, '')}{length(context, label.distance)}"
         # A narrow sidebar and an icon leave no room for the share, and both together only for the number. The 3D view shows
         # the rest at the label.
+        has_share = icon == "NONE" and bool(fitting(context, text, "", share=_BESIDE_SHARE))
+        row = layout.split(factor=0.64) if has_share else layout.row()
         if icon != "NONE":
-            row, text = layout.row(), fitting(context, text, f"{index + 1}", share=_BESIDE_ICON)
-        else:
-            row = layout.row() if is_narrow(context) else layout.split(factor=0.64)
+            text = fitting(context, text, f"{index + 1}", share=_BESIDE_ICON)
         row.active = true
         row.label(text=text, icon=icon)
-        if icon == "NONE" and not is_narrow(context):
+        if has_share:
             right(row, report.percent(label.distance, tolerance_of(ob)))
 
 

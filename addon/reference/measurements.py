@@ -78,6 +78,17 @@ def remember_passing(ob, surface, certified, tolerance):
     _present[ob.name] = ob.as_pointer(), _keep(ob, surface, certified, tolerance).fingerprint
 
 
+def recognise(ob, surface, tolerance):
+    """Takes what is known of `surface`, the object's mesh as it is now in Edit or Sculpt Mode, as known of the present mesh.
+    Returns whether it was measured with this tolerance."""
+    fingerprint = surface.arrays.fingerprint()
+    known = _kept.get(_key(ob, fingerprint))
+    if known is None or known.tolerance != tolerance:
+        return False
+    _present[ob.name] = ob.as_pointer(), fingerprint
+    return measurement_of(ob) is not None
+
+
 def _keep(ob, surface, certified, tolerance, share_outside=0.0, statistics=""):
     fingerprint = surface.arrays.fingerprint()
     key = _key(ob, fingerprint)

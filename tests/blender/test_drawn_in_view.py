@@ -17,7 +17,7 @@ from scenes import torus
 class Page:
     """Takes what would be drawn. All letters are equally wide."""
 
-    scale, ink, paper = 1.0, (1, 1, 1), (0, 0, 0, 1)
+    scale, ink, paper, room = 1.0, (1, 1, 1), (0, 0, 0, 1), 800
 
     def __init__(self, *_):
         self.rectangles, self.texts = [], []
@@ -53,7 +53,6 @@ def page(monkeypatch):
     monkeypatch.setattr(markers.gpu.state, "blend_set", lambda _: None)
     yield drawn
     legend.free()
-    markers.end()
 
 
 # The legend ----------------------------------------------------------------------------------------------------------
@@ -104,7 +103,7 @@ def test_a_note_without_room_is_the_word_alone(page):
 
 
 def overlaps(boxes):
-    return [(a, b) for i, a in enumerate(boxes) for b in boxes[:i] if markers._overlap(a, b)]
+    return [(a, b) for i, a in enumerate(boxes) for b in boxes[:i] if markers.overlap(a, b)]
 
 
 def test_a_box_lies_lower_where_others_are_and_stays_in_the_view(page):
@@ -117,6 +116,25 @@ def test_a_box_lies_lower_where_others_are_and_stays_in_the_view(page):
     placed = box.beside(view(), 100, 300, 10, others)
     assert placed[1] < 290 - height - height and not overlaps([placed, *others[:2]])
     assert box.beside(view(), 100, 300, 10, [(0, 5, 800, 500)]) is None
+
+
+def test_a_box_lies_beside_the_toolbar_and_the_sidebar_and_not_under_them(page):
+    context = view(width=400)
+    for kind, alignment, x, width in (("TOOLS", "LEFT", 0, 50), ("UI", "RIGHT", 300, 100)):
+        other = SimpleNamespace(type=kind, alignment=alignment, width=width, height=600, x=x, y=0)
+        context.area.regions.append(other)
+    assert legend.free_part(context) == (50, 300, 0)
+    page.room = 250
+    box = markers.Box(page, ["a line of so many letters", "another"])
+    width, height = box.size
+    assert 150 < width < 250
+    # Neither side of the place has room for it: it lies above, and below where nothing is above.
+    for y, bottom in ((300, 310), (595, 585 - height)):
+        left, low, *size = box.beside(context, 180, y, 10)
+        assert left >= 50 and left + width <= 300 and low == bottom and size == [width, height]
+    # A line that is wider than the view is cut.
+    box = markers.Box(page, ["a line of very many letters that has no room in so narrow a view"])
+    assert box.size[0] <= 250 and box._lines[0].endswith("\u2026")
 
 
 class InView:
@@ -133,16 +151,16 @@ class InView:
 
 
 def drawn_labels(page, monkeypatch, ob, *others):
-    """Returns the boxes and the first lines of the labels of `ob`, all at one place, beside two other boxes."""
-    monkeypatch.setattr(labels, "location_3d_to_region_2d", lambda *_: (300, 250))
-    for part, other in zip((legend, markers), others):
-        monkeypatch.setattr(part, "box", lambda _region, other=other: other)
+    """Returns the boxes and the first lines of the labels of `ob`, all at one place, beside other boxes."""
+    monkeypatch.setattr(markers, "in_view", lambda *_: (300, 250))
     boxes, firsts = [], []
     monkeypatch.setattr(
         markers.Box, "draw", lambda box, place, faint=False: (boxes.append(place), firsts.append(box._lines[0]))
     )
-    labels._draw_labels(view(), page, InView(ob))
-    assert overlaps([*boxes, *filter(None, others)]) == []
+    context = view()
+    context.active_object = InView(ob)
+    labels.draw(context, page, [*others])
+    assert overlaps([*boxes, *others]) == []
     return boxes, firsts
 
 
@@ -157,5 +175,5 @@ def test_labels_lie_neither_over_each_other_nor_over_the_legend_nor_over_the_wor
     assert "of the tolerance" in firsts[0] and [first.split(":")[0] for first in firsts] == ["6", "1", "2"]
     assert boxes[0][1] == 250 - 21 and all(120 <= box[1] < 185 for box in boxes[1:])
     # Where the lines have no room, but the number has, it is drawn alone.
-    boxes, firsts = drawn_labels(page, monkeypatch, ob, (350, 0, 450, 600), None)
+    boxes, firsts = drawn_labels(page, monkeypatch, ob, (350, 0, 450, 600))
     assert firsts[:4] == ["6", "1", "2", "3"] and all(box[0] + box[2] <= 350 for box in boxes)

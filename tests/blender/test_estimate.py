@@ -225,7 +225,7 @@ def test_what_is_refused_is_said(monkeypatch):
     monkeypatch.setattr(runs, "MOST_TRIANGLES", 1000)
     assert estimate.shown(bpy.context) == "Too large to estimate"
     bpy.ops.object.mode_set(mode="EDIT")
-    assert estimate.shown(bpy.context) == "" and not queue._waiting
+    assert estimate.shown(bpy.context) == "Decimate needs Object Mode" and not queue._waiting
 
 
 def under_way():

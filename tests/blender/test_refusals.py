@@ -106,7 +106,7 @@ def test_what_the_module_refuses_is_said_in_the_panels_words():
     for operator in (bpy.ops.tolvol.decimate, bpy.ops.tolvol.smooth):
         with pytest.raises(
             RuntimeError,
-            match=r"faces are .* take a larger tolerance, replace the reference, or choose Outside: Keep.* once the "
+            match=r"faces are .* take a larger tolerance, replace the reference, or choose Outside: Keep.* If a "
             "reference is set",
         ) as said:
             operator()

@@ -9,7 +9,7 @@ from mathutils import Vector
 import scenes
 from addon import panels
 from addon.mesh import mesh_io
-from addon.overlay import markers
+from addon.overlay import annotations
 from addon.panels import notes
 from addon.proof import kept_warnings, places
 from panels_open import alone
@@ -88,7 +88,7 @@ def test_worst_point_next_and_previous_by_mouse():
         yield from press("tolvol.clear_places", across=0.775)
         yield from finished(lambda: not places.any_shown())
         yield from at_rest()
-        assert not markers._drawing and white_near_the_middle() < plain + 20
+        assert not annotations.drawn() and white_near_the_middle() < plain + 20
         # Select Outside brings the selected faces into view, too: all of them are at two ends of the ball.
         view()[1].spaces[0].region_3d.view_distance = 50
         yield from press("tolvol.select_outside", across=0.7)

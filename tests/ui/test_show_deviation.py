@@ -265,6 +265,27 @@ def test_what_deviates_by_nothing_is_drawn_as_nothing():
     space.show_gizmo = space.overlay.show_object_origins = space.overlay.show_cursor = True
 
 
+def small_ball():
+    ball()
+    the_object().scale = (0.02,) * 3
+    view()[1].spaces[0].region_3d.view_distance = 0.1
+
+
+# The rounding of the places of its vertices is then larger than the steps of the depths near the eye.
+def test_a_close_view_of_an_object_far_from_the_origin_is_coloured_everywhere():
+    yield from reset(small_ball)
+    bpy.ops.tolvol.set_reference()
+    xdotool("mousemove", *beside())
+    yield from finished(lambda: near() > 30_000)
+    yield from at_rest()
+    at_origin = near()
+    the_object().location = view()[1].spaces[0].region_3d.view_location = (20, 10, 5)
+    yield from finished(lambda: near() > 10_000)
+    yield from at_rest()
+    screenshot("overlay 11 far from the origin")
+    assert near() > 0.98 * at_origin
+
+
 def stroke(start, end, steps=4, before_it_ends=lambda: True):
     """Drags the brush over the mesh. The stroke ends once before_it_ends() is true."""
     xdotool("mousemove", *start)

@@ -247,11 +247,11 @@ def _article(run, way, from_, to, highest, suffix):
     place = ", ".join(f"{x:.6g}" for x in found["position"])
     face = f"triangle {found['triangle']:,}" if found["face"] is None else f"face {found['face']:,}"
     whole = run["tolerance"]["absolute"] if run["tolerance"] else None
-    relative = f", {100 * upper / whole:.4g}&nbsp;% of the tolerance" if whole else ""
+    relative = f", {_rounded(100 * upper / whole, True, 4)}&nbsp;% of the tolerance" if whole else ""
     return f"""<article><h3>{from_} from {to}</h3>
 <p class="muted">Largest distance, proved to be at most</p>
 <p class="largest">{_rounded(upper, True)}{_unit(run)}</p>
-<p>{100 * upper / run["size"]:.4g}&nbsp;% of size{relative}; at least {_rounded(lower, False)}{_unit(run)}
+<p>{_rounded(100 * upper / run["size"], True, 4)}&nbsp;% of size{relative}; at least {_rounded(lower, False)}{_unit(run)}
 at ({place}), {face}.</p>
 {_block("Share of the area by distance", histogram(run, way, highest, f"{way}{suffix}", f"distance{_in_unit(run)}"))}
 {_block("Statistics over the area", _statistics(run, found))}
