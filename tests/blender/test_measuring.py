@@ -13,6 +13,7 @@ from addon.panels import deviation
 from addon.proof import statistics, verdict
 from addon.proof.verdict import FAIL, NOT_CHECKED, PASS
 from addon.reference import measurements
+from addon.shared.proof import measure
 from scenes import sheet
 
 
@@ -67,6 +68,24 @@ def test_a_hole_is_a_failure_at_once_and_its_numbers_are_those_of_check():
     assert verdict.of(ob) == found, "it is still the same mesh"
     assert bpy.ops.tolvol.check() == {"FINISHED"}
     assert verdict.of(ob).backward == found.backward and ob.tolvol.measurement.complete
+
+
+def test_what_check_has_measured_is_known_in_edit_mode_without_another_measurement(monkeypatch):
+    ob = sheet(count=20, bumps=0.0)
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    ob.data.vertices[200].co.z += 0.05
+    ob.data.update()
+    assert bpy.ops.tolvol.check() == {"FINISHED"}
+    found, asked = verdict.of(ob), []
+    both_ways = measure.both_ways
+    monkeypatch.setattr(measure, "both_ways", lambda *given: asked.append(given) or both_ways(*given))
+    bpy.ops.object.mode_set(mode="EDIT")
+    measuring.note(ob)
+    measured()
+    assert found.word == FAIL and verdict.of(ob) == found and not asked
+    cut_a_hole(ob)
+    measured()
+    assert verdict.word(ob) == FAIL and verdict.of(ob) != found and len(asked) == 1
 
 
 def test_a_change_of_the_mesh_tolerance_or_reference_counts():

@@ -121,6 +121,9 @@ def test_a_surface_is_read_again_only_after_a_change():
     found.touch(False)
     found.update(ob, depsgraph)
     assert found.changes == 2, "it was the same"
+    found.touch(True)
+    found.update(ob, depsgraph)
+    assert found.changes == 2, "so were its triangles"
 
 
 def reference_shown(ob):

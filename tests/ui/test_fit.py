@@ -37,7 +37,9 @@ def test_escape_keeps_the_best_so_far():
     reference = scenes.world_triangles(suzanne())
     said = status_texts()
     fit(suzanne())
-    yield from finished(lambda: said and "triangles so far, not proved    Esc: Keep Present Result" in said[-1], pause=0.02)
+    yield from finished(
+        lambda: said and "triangles so far, not proved    Esc: Keep Present Result" in said[-1], pause=0.02
+    )
     key("Escape")
     yield from finished(lambda: not suzanne().modifiers)
     assert_proved(suzanne(), reference, 0.2)
