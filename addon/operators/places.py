@@ -14,8 +14,9 @@ from .check import Comparison
 
 # The eye is so many radii of a place away from it, or more: what is around has to be seen, too.
 _AROUND = 3.0
-# The eye is never nearer than this share of the size of the reference.
-_LEAST = 0.2
+# The eye is never nearer than the first share of the size of the reference, and never farther than the second one: a region
+# may be most of the mesh.
+_LEAST, _MOST = 0.2, 0.7
 # The view is turned unless the surface at the place looks at the eye at least so much (a cosine).
 _FACING = 0.3
 
@@ -55,7 +56,8 @@ def _frame(context, ob):
     if normal.length and not view.lock_rotation and normal.dot(towards) < _FACING:
         view.view_rotation = normal.to_track_quat("Z", "Y")
     view.view_location = Vector(place.position)
-    view.view_distance = max(_AROUND * place.radius, _LEAST * snapshots.snapshot_size(ob))
+    size = snapshots.snapshot_size(ob)
+    view.view_distance = min(max(_AROUND * place.radius, _LEAST * size), _MOST * size)
 
 
 class TOLVOL_OT_worst_point(Comparison, bpy.types.Operator):
