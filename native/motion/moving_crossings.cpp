@@ -203,8 +203,8 @@ void MovingCrossings::test(std::uint32_t face, std::vector<glm::uvec2>& failed) 
   });
 }
 
-/// Adds to `failed` pairs that test() left out, because the one that would have looked at them fails anyway: of this face
-/// and others, one of which fails and the other one does not.
+/// Adds to `failed` pairs that test() left out, because the one that would have looked at them fails anyway: of this
+/// face and others, one of which fails and the other one does not.
 void MovingCrossings::test_left_out(std::uint32_t face, std::vector<glm::uvec2>& failed) const {
   const bool fails = failed_[face] == now_;
   std::size_t looked_at = 0;
