@@ -74,7 +74,7 @@ def _prepare(name):
         tolerance = tolerances.required(ob, reference.size())
     except Refused as error:
         return _fail(name, str(error))
-    if measurements.recognise(ob, surface, tolerance):  # It was measured before its mode changed, say.
+    if measurements.recognise(ob, surface, tolerance):  # The same mesh was measured in another mode, for example.
         redraw_views()
         return None
     threads = preferences.threads(bpy.context)

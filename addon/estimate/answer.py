@@ -30,13 +30,14 @@ class Estimate:
 def shown(context):
     """Returns the Estimate for the objects that Decimate would work on, or a text that says why there is none.
 
-    The text is empty where the panel says the reason itself. Panels call the function while they are drawn: it reads what is
-    known, and asks for what is not.
+    The text is empty where the panel says the reason itself, as it does in Object Mode. Panels call the function while they
+    are drawn: it reads what is known, and asks for what is not.
     """
     objects = targets(context)
-    if job.under_way() or any(blocked.decimate_blocked(ob) for ob in objects):
+    at_work = job.under_way()
+    if at_work or any(blocked.decimate_blocked(ob) for ob in objects):
         runs.cancel()
-        return "" if job.under_way() or objects[0].mode == "OBJECT" else _OTHER_MODE
+        return "" if at_work or objects[0].mode == "OBJECT" else _OTHER_MODE
     settings = objects[0].tolvol
     done = [_decimated(ob, settings) for ob in objects]
     if all(done):

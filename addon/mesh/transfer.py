@@ -31,8 +31,8 @@ class Writing:
     prepare() builds a scratch mesh, which lives as long as the context. After that, `layout` tells where the result is in
     the written mesh. Only write() changes the mesh.
 
-    compact: make the scratch mesh anew at the end, without the memory of what was removed from it. It is for those who
-    prepare several results of one mesh before they write the first.
+    compact: whether prepare() ends with a copy of the scratch mesh, which frees the memory of removed elements. LOD Chain
+    asks for it, because it prepares all levels before it writes the first one.
     """
 
     def __init__(self, mesh, source, result, compact=False):

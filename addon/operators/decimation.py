@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Decimates arrays within the tolerance in a thread and certifies the result, for every operator that decimates meshes."""
+"""Decimates arrays within the tolerance in a thread and certifies the result, for every operator that decimates
+meshes, and prepares what these write."""
 
 import math
 

@@ -48,9 +48,7 @@ def draw_hover(context, page, hover, taken):
         spot = markers.in_view(context, hover.position)
         if spot is not None:
             _dot(page, *spot)
-    box, away = markers.Box(page, hover.lines), 2 * _BESIDE * page.scale
-    if place := box.beside(context, *hover.mouse, away, taken) or box.beside(context, *hover.mouse, away):
-        box.draw(place)
+    markers.Box(page, hover.lines).draw_beside(context, *hover.mouse, 2 * _BESIDE * page.scale, taken)
 
 
 def _dot(page, x, y):

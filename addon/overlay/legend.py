@@ -242,15 +242,15 @@ def percent(share):
 
 
 def free_part(context):
-    """Returns (left, right, bottom): the edges of the part of the view that neither the toolbar nor the sidebar nor what is
-    below covers, in pixels of the region."""
+    """Returns (left, right, bottom): the edges, in pixels of the region, of the part of the view that neither the toolbar, nor
+    the sidebar, nor a region at the bottom covers."""
     region, left, right, bottom = context.region, 0, context.region.width, 0
     for other in context.area.regions:
         if other == region or other.width <= 1 or other.height <= 1:
             continue
-        if other.alignment == "RIGHT" and other.type == "UI":
+        if other.alignment == "RIGHT" and other.type in {"UI", "TOOLS"}:
             right = min(right, other.x - region.x)
-        elif other.alignment == "LEFT" and other.type == "TOOLS":
+        elif other.alignment == "LEFT" and other.type in {"UI", "TOOLS"}:
             left = max(left, other.x + other.width - region.x)
         elif other.alignment == "BOTTOM" and other.y <= region.y + bottom:
             bottom = max(bottom, other.y + other.height - region.y)

@@ -17,7 +17,8 @@ INK, EDGE = (1, 1, 1, 1), (0, 0, 0, 0.8)
 def draw(context, page, taken):
     """Draws the places of the active object. Returns (left, bottom, width, height) of the box, or None if there is none.
 
-    taken: such rectangles, in which no cross is drawn, and no box where there is room elsewhere.
+    taken: rectangles of the same form that are covered. A cross that would touch one is left out, and the box lies over one
+    only if it has no other room.
     """
     ob = context.active_object
     found, at, _ = places.shown(ob)
@@ -33,10 +34,7 @@ def draw(context, page, taken):
     if spots[at] is None:
         return None
     box, away = Box(page, described(context, ob)), 2 * _PRESENT_ARM * page.scale
-    place = box.beside(context, *spots[at], away, taken) or box.beside(context, *spots[at], away)
-    if place:
-        box.draw(place)
-    return place
+    return box.draw_beside(context, *spots[at], away, taken)
 
 
 def in_view(context, position):
@@ -75,19 +73,29 @@ class Box:
         height) of boxes.
         """
         width, height = self.size
-        least, right, _ = legend.free_part(context)
+        least, right, low = legend.free_part(context)
+        if width > right - least or height > context.region.height - low:
+            return None
         left, bottom = x + away, y - height / 2
         if left + width > right:
             left = x - away - width
         if left < least:
             left = max(min(x - width / 2, right - width), least)
             bottom = y + away if y + away + height <= context.region.height else y - away - height
-        bottom = min(max(bottom, 0), context.region.height - height)
+        bottom = min(max(bottom, low), context.region.height - height)
         while covered := [other for other in others if overlap((left, bottom, width, height), other)]:
             bottom = min(other[1] for other in covered) - height - self._page.scale
-            if bottom < 0:
+            if bottom < low:
                 return None
         return left, bottom, width, height
+
+    def draw_beside(self, context, x, y, away, others):
+        """Draws the lines beside a place, over the others if there is no room elsewhere. Returns the rectangle, or None if the
+        view is too small."""
+        place = self.beside(context, x, y, away, others) or self.beside(context, x, y, away)
+        if place:
+            self.draw(place)
+        return place
 
     def draw(self, place, faint=False):
         left, bottom, width, height = place

@@ -27,7 +27,7 @@ vec4 displayed(vec3 colour, float opacity) {
 """
 
 # The vertex shader computes the same two products as Blender's own shaders, so that the depths agree up to rounding. The
-# surface is moved towards the eye by more than this: by NEARER, some steps of a depth buffer of 24 bits, and by STEPS times
+# surface is moved towards the eye by more than this: by NEARER, some steps of a depth buffer of 24 bits, and by four times
 # the rounding of the products, which is large in a close view of an object that is far from the origin.
 _SURFACE_VERTEX = """
 void main() {
@@ -36,7 +36,7 @@ void main() {
   vec3 world = (told.model * vec4(position, 1.0)).xyz;
   gl_Position = m * vec4(world, 1.0);
   vec4 summed = abs(m[0] * world.x) + abs(m[1] * world.y) + abs(m[2] * world.z) + abs(m[3]);
-  gl_Position.z -= NEARER * gl_Position.w + STEPS * 6e-8 * (summed.z + summed.w);
+  gl_Position.z -= NEARER * gl_Position.w + ROUNDED * (summed.z + summed.w);
 }
 """
 
@@ -131,7 +131,7 @@ def _info(varying, attributes, vertex, fragment, shared=()):
     info.vertex_out(interface)
     info.fragment_out(0, "VEC4", "shown")
     info.push_constant("BOOL", "srgbTarget")
-    info.define("STEPS", "4.0")
+    info.define("ROUNDED", "2.4e-7")  # four times 2^-24, the rounding of float32
     for name, colour in zip(("OUTSIDE", "STRIPE"), native.module.OUTSIDE_COLOURS):
         info.define(name, f"vec3({', '.join(f'{level / 255:.4f}' for level in colour)})")
     info.vertex_source(vertex)

@@ -98,7 +98,7 @@ class Surface(Triangles):
                 triangles = triangles[~hidden[mesh_io.column(found, "polygon_index", 1, np.int32)]]
             self._polygons = len(mesh.polygons)
             self._recut = False
-            # An undo step, and a label, leave the mesh as it is.
+            # Blender also reports a change where the mesh stays the same, for example when a label is added.
             now = co, triangles, all_triangles
             if all(map(np.array_equal, now, (self.vertices, self.triangles, self.all_triangles))):
                 return

@@ -164,7 +164,7 @@ class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):
         column = self.layout.column()
         column.active = ob.tolvol.show_deviation
         column.row().prop(ob.tolvol, "deviation_surface", expand=True)
-        if reason := reasons.unsigned(ob):
+        if ob.tolvol.show_deviation and (reason := reasons.unsigned(ob)):
             column.label(text=wrapped(context, reason, most=1)[0])
         else:
             column.row().prop(ob.tolvol, "deviation_kind", expand=True)
@@ -195,8 +195,8 @@ class TOLVOL_UL_labels(bpy.types.UIList):
         true = labels.current(ob, label)
         icon = "ERROR" if not true else GHOST if label.on_reference else "NONE"
         text = f"{index + 1}:  {_SIGNS.get(label.side, '')}{length(context, label.distance)}"
-        # A narrow sidebar and an icon leave no room for the share, and both together only for the number. The 3D view shows
-        # the rest at the label.
+        # Beside an icon, and where the text needs the room, the share is left out. Where an icon leaves no room for the text,
+        # the number stands alone. The 3D view shows the rest at the label.
         has_share = icon == "NONE" and bool(fitting(context, text, "", share=_BESIDE_SHARE))
         row = layout.split(factor=0.64) if has_share else layout.row()
         if icon != "NONE":

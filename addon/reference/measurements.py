@@ -79,8 +79,8 @@ def remember_passing(ob, surface, certified, tolerance):
 
 
 def recognise(ob, surface, tolerance):
-    """Takes what is known of `surface`, the object's mesh as it is now in Edit or Sculpt Mode, as known of the present mesh.
-    Returns whether it was measured with this tolerance."""
+    """Takes what was measured of `surface`, the object's mesh as it is now in Edit or Sculpt Mode, since Blender began, for
+    the present mesh. Returns whether it was measured at this place with this tolerance."""
     fingerprint = surface.arrays.fingerprint()
     known = _kept.get(_key(ob, fingerprint))
     if known is None or known.tolerance != tolerance:

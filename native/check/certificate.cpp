@@ -54,7 +54,8 @@ constexpr int kSearchesInVain = 4;
 constexpr double kRoomToLeave = 1.0 / 32;
 // The grid's guess of a distance is used without a search up to this distance.
 constexpr double kRoom = 0.7;
-// In the frame, more than the rounding by which a proof may reach a point that is beyond the limit: witness_error().
+// In the frame, more than witness_error(), by which a proof may reach a point that is beyond the limit: 2^-40 is 16
+// times witness_error(1).
 constexpr double kBeyondRounding = 0x1p-40;
 
 bool comes_first(const glm::dvec3& p, const glm::dvec3& q) {

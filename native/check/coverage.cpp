@@ -25,9 +25,9 @@ constexpr std::size_t kBudgetOfChange = 1 << 12;
 // the headroom below the tolerance, so that it finds witnesses again for a mesh that kept within the headroom. Once a
 // point of a triangle is known to be beyond the tolerance, it goes no deeper than a change does.
 constexpr std::size_t kBudgetOfElement = 64, kBudgetOfFirst = 1 << 16;
-// Of such a triangle, of which nothing is promised, it looks at this many parts. All such triangles share a further
-// budget, this share of the one above.
-constexpr std::size_t kBudgetOfBeyond = 64, kShareOfBeyond = 8;
+// It looks at this many parts of a triangle with a point beyond the tolerance: nothing is promised of such a triangle.
+// All of them share a further budget, which is the one above over kDivisorOfBeyond.
+constexpr std::size_t kBudgetOfBeyond = 64, kDivisorOfBeyond = 8;
 // A part of such a triangle counts once more for each so many nodes that the searches for it visit. Near a vertex of
 // thousands of needles each search visits all of them.
 constexpr std::size_t kNodesOfPart = 64;
@@ -77,7 +77,7 @@ Coverage::Coverage(const TriangleMesh& reference, double limit, std::size_t elem
       pieces_(element_count),
       distance_(element_count, kNoPiece),
       budget_of_first_(kBudgetOfFirst + kBudgetOfElement * element_count),
-      budget_of_beyond_(budget_of_first_ / kShareOfBeyond),
+      budget_of_beyond_(budget_of_first_ / kDivisorOfBeyond),
       split_into_(reference.triangles.size()) {}
 
 void Coverage::set_witness(std::uint32_t element, std::uint32_t triangle) {

@@ -18,8 +18,8 @@ struct Part {
 
 /// A cut puts a corner up to 3u |x| from its exact place, u = 2^-53, and a part of a part inherits the error, so that
 /// after n cuts every point of the whole is within 3 n u |x| of the parts. Since |x| <= sqrt(3) R + d, 64 cuts err by
-/// less than 64 * 5.2 u (R + d), for which witness_error() has room. Two cuts may be needed to halve a part, so that 64
-/// reach a part of a thousand-millionth of the whole.
+/// less than 64 * 5.2 u (R + d), for which witness_error() has room. split() may take two cuts to halve the longest
+/// edge, so that 64 cuts by split() alone reach parts of 2^-32 of the length.
 inline constexpr std::uint32_t kMostCuts = 64;
 
 double longest_squared(const Part& part);

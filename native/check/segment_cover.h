@@ -10,8 +10,8 @@
 namespace tolvol {
 
 /// A cover along a segment may exceed the provable distance by this share of witness_error(). The error of a distance
-/// is below 64 u (R + d), by 36 u in closest_point() (geometry/closest_point.cpp) and 6 u in the corners that it gets.
-/// A point of the segment is placed once, not cut 64 times, which errs by 5.2 u more. This leaves 442 of the 512 u.
+/// is below 64 u (R + d): closest_point() errs by 36 u (geometry/closest_point.cpp), and the corners that it gets by 6
+/// u. A point of the segment is placed once and not cut 64 times, which adds 5.2 u. This leaves 442 of the 512 u.
 ///
 /// The share is needed to find again what another search has proved. Parts of a larger piece lie up to 64 * 3 u (1 + d)
 /// from the piece, where |x| <= 1 + d as in a frame, and the distances of their witnesses err by 47 u, together 239 u.

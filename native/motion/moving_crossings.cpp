@@ -203,8 +203,8 @@ void MovingCrossings::test(std::uint32_t face, std::vector<glm::uvec2>& failed) 
   });
 }
 
-/// Adds to `failed` pairs that test() left out, because the one that would have looked at them fails anyway: of this
-/// face and others, one of which fails and the other one does not.
+/// Adds to `failed` the pairs of this face and others that test() left out although exactly one of the two fails: the
+/// one that looks_at() names had failed already and did not look.
 void MovingCrossings::test_left_out(std::uint32_t face, std::vector<glm::uvec2>& failed) const {
   const bool fails = failed_[face] == now_;
   std::size_t looked_at = 0;
@@ -254,7 +254,7 @@ std::vector<std::uint32_t> MovingCrossings::failing(std::span<const std::uint32_
   };
   look([&](std::uint32_t face, std::vector<glm::uvec2>& pairs) { test(face, pairs); });
   if (result.empty()) return result;
-  // Either those that fail look for the others or the others for them: the fewer do.
+  // The smaller group looks: the faces that fail, or those that do not.
   const bool failing_look = result.size() < asked.size() / 2;
   look([&](std::uint32_t face, std::vector<glm::uvec2>& pairs) {
     if ((failed_[face] == now_) == failing_look) test_left_out(face, pairs);

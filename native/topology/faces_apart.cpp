@@ -52,7 +52,7 @@ double gap_along(const dvec3& u, const Pair& pair) {
   return std::max(b_after_a, a_after_b) - (4 * kRounding * most + kSmallest);
 }
 
-/// Of the edges of both, the longest one.
+/// Returns the longest edge of the two triangles.
 dvec3 longest_edge(const Pair& pair) {
   dvec3 longest(0);
   double most2 = 0;
@@ -71,7 +71,8 @@ void for_each_direction(const Pair& pair, Visit&& visit) {
   const auto& [a, b, size] = pair;
   const dvec3 between = b[0] + b[1] + b[2] - (a[0] + a[1] + a[2]);
   if (visit(between)) return;
-  // A needle, or a segment, and a triangle beside it are apart along the way between them at right angles to it.
+  // A needle or a segment and a triangle beside it are mostly apart along the part of `between` that is perpendicular
+  // to the longest edge.
   const dvec3 along = longest_edge(pair);
   if (visit(squared_length(along) * between - glm::dot(along, between) * along)) return;
   const dvec3 normal_a = glm::cross(a[1] - a[0], a[2] - a[0]), normal_b = glm::cross(b[1] - b[0], b[2] - b[0]);

@@ -117,11 +117,11 @@ Box box_of(const Corners& corners) {
 }
 
 bool is_degenerate(const Corners& t) {
+  if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return true;  // Equal corners need no exact arithmetic.
   // Each difference has a relative error of at most u = 2^-53, so a component of the normal that is larger than 8 u
   // times its two products is not zero. The products are compared with kSmallest, below which they lose bits.
   constexpr double kRounding = 8 * 0x1p-53, kSmallest = 1e-280;
   const glm::dvec3 u = t[1] - t[0], v = t[2] - t[0];
-  if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return true;
   for (int x = 0, y = 1, z = 2; x < 3; y = z, z = x++) {
     const double one = u[y] * v[z], other = u[z] * v[y], sum = std::abs(one) + std::abs(other);
     if (sum > kSmallest && std::abs(one - other) > kRounding * sum) return false;

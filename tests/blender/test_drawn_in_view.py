@@ -177,3 +177,43 @@ def test_labels_lie_neither_over_each_other_nor_over_the_legend_nor_over_the_wor
     # Where the lines have no room, but the number has, it is drawn alone.
     boxes, firsts = drawn_labels(page, monkeypatch, ob, (350, 0, 450, 600))
     assert firsts[:4] == ["6", "1", "2", "3"] and all(box[0] + box[2] <= 350 for box in boxes)
+
+
+# Marks ---------------------------------------------------------------------------------------------------------------
+
+
+def test_what_is_outside_the_view_is_not_drawn(monkeypatch):
+    seen = []
+    monkeypatch.setattr(markers, "location_3d_to_region_2d", lambda *_: seen[-1])
+    for spot in ((-1, 5), (801, 5), (5, -1), (5, 601), None):
+        seen.append(spot)
+        assert markers.in_view(view(), (0, 0, 0)) is None
+    seen.append((800, 0))
+    assert markers.in_view(view(), (0, 0, 0)) == (800, 0)
+
+
+def test_crosses_do_not_lie_over_what_is_drawn_and_the_box_only_without_other_room(page, monkeypatch):
+    ob = torus()
+    ob.tolvol.tolerance_percent = 0.5
+    assert bpy.ops.tolvol.set_reference() == bpy.ops.tolvol.worst_point() == {"FINISHED"}
+    monkeypatch.setattr(markers, "in_view", lambda *_: (300, 250))
+    context = view()
+    context.active_object, context.scene = InView(ob), bpy.context.scene
+    whole = markers.draw(context, page, [])
+    crosses = len(page.rectangles)
+    assert crosses > 8 and whole[0] > 300
+    page.rectangles.clear()
+    corner = (280, 230, 40, 40)
+    assert markers.draw(context, page, [corner]) == whole and len(page.rectangles) < crosses - 7
+    below = markers.draw(context, page, [whole])
+    assert not overlaps([below, whole])
+    assert markers.draw(context, page, [(0, 0, 800, 600)]) == whole
+
+
+def test_what_the_probe_reads_lies_beside_the_labels(page, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(markers.Box, "draw", lambda box, place, faint=False: drawn.append(place))
+    hover = SimpleNamespace(region=1, lines=["0.1 mm outside"], position=None, mouse=(300, 250))
+    labels.draw_hover(view(), page, hover, [])
+    labels.draw_hover(view(), page, hover, [drawn[0]])
+    assert len(drawn) == 2 and not overlaps(drawn)

@@ -17,6 +17,7 @@ from addon.mesh.mesh_io import column
 from addon.proof import verdict
 from addon.reference import snapshots
 from scenes import activate, torus, world_triangles
+from test_attributes import KINDS, creases, dressed_torus
 
 PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Diagonal((1, 2, 0.5, 1))
 
@@ -47,6 +48,29 @@ def fresh_count(**options):
     bpy.ops.tolvol.decimate(**options)
     count, ob.data = len(ob.data.polygons), mesh
     return count
+
+
+def data_of(mesh):
+    """All that a mesh holds at its vertices, edges, faces and corners, by name."""
+    held = {
+        name: column(each.data, *KINDS[each.data_type])
+        for name, each in mesh.attributes.items()
+        if each.data_type in KINDS
+    }
+    held |= {f"key {key.name}": column(key.data, "co", 3) for key in mesh.shape_keys.key_blocks}
+    held |= {f"UV map {layer.name}": column(layer.data, "uv", 2) for layer in mesh.uv_layers}
+    held["groups"] = np.array([(i, g.group, g.weight) for i, v in enumerate(mesh.vertices) for g in v.groups])
+    held["materials"] = column(mesh.polygons, "material_index", 1, np.int32)
+    return held | {"creases": creases(mesh), "corners": column(mesh.loops, "vertex_index", 1, np.int32)}
+
+
+def test_a_level_has_all_data_that_decimate_keeps():
+    ob = dressed_torus()
+    level = make(levels=2, percentages=padded(1, 3))[0]
+    assert bpy.ops.tolvol.decimate(tolerance_percent=1) == {"FINISHED"}
+    wanted, found = data_of(ob.data), data_of(level.data)
+    assert wanted.keys() == found.keys() and len(wanted) > 20
+    assert [name for name in wanted if not np.array_equal(wanted[name], found[name])] == []
 
 
 @pytest.mark.parametrize("matrix", [Matrix(), PLACED], ids=["local", "placed"])

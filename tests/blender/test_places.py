@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Worst Point finds each region beyond the tolerance, or the places nearest to it, and knows when that is out of date."""
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
+from mathutils import Quaternion
 
 from addon.mesh import mesh_io
 from addon.operators import places as operators
 from addon.proof import places, verdict
+from addon.reference import snapshots
 from scenes import activate, add_object, sheet, sheet_arrays, torus
 
 PEAKS = {100: 0.2, 500: 0.3, 501: 0.25, 800: 0.22}  # 500 and 501 are neighbours
@@ -52,6 +56,19 @@ def test_each_region_beyond_is_one_place_with_its_area_and_largest_distance(capf
     # Below each peak a part of the reference is beyond the tolerance, too.
     below = [place for place in found if place.on_reference]
     assert len(below) == 3 and all(place.position[2] == 0 and place.area > 0 for place in below)
+
+
+def test_the_view_shows_a_place_from_near_although_its_region_is_most_of_the_mesh():
+    ob = peaked()
+    ob.data.vertices.foreach_set("co", mesh_io.column(ob.data.vertices, "co", 3).ravel() + np.float32(0.2))
+    changed(ob)
+    assert bpy.ops.tolvol.worst_point() == {"FINISHED"}
+    view = SimpleNamespace(view_perspective="PERSP", view_rotation=Quaternion(), lock_rotation=False)
+    context = SimpleNamespace(space_data=SimpleNamespace(type="VIEW_3D", region_3d=view))
+    operators._frame(context, ob)
+    place, size = places.shown(ob)[0][0], snapshots.snapshot_size(ob)
+    assert place.radius > 0.4 * size and view.view_distance == pytest.approx(0.7 * size)
+    assert np.allclose(view.view_location, place.position)
 
 
 def test_one_way_leaves_the_reference_out():

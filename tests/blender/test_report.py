@@ -162,8 +162,11 @@ def test_page_stands_alone_and_says_what_was_measured():
     largest = run["forward"]["largest"][1]
     assert 0.1 <= float(re.search(r"at most\s+([\d.]+) mm", page.text)[1]) <= largest * 1.001
     # Rounded up: a proved bound must not look smaller than it is.
-    share = float(re.search(r"size, ([\d.]+) % of the tolerance", page.text)[1])
-    assert largest / 0.05 * 100 * (1 - 1e-6) <= share <= largest / 0.05 * 100 * 1.001
+    of_size, of_tolerance = map(
+        float, re.search(r"([\d.]+) % of size, ([\d.]+) % of the tolerance", page.text).groups()
+    )
+    for share, whole in ((of_size, run["size"]), (of_tolerance, 0.05)):
+        assert 100 * largest / whole * (1 - 1e-6) <= share <= 100 * largest / whole * 1.001
     for entry in run["forward"]["percentiles"]:
         assert f"{entry['percent']:g} % of area within" in page.text and f"{entry['distance']:.4g}" in page.text
     assert "0.02 to 0.05" in page.text and "beyond 0.05" in page.text and "is not closed" in page.text

@@ -103,6 +103,11 @@ def test_a_task_that_its_program_decides_is_not_run_again(tmp_path, monkeypatch,
     assert [number_of_runs(), number_of_runs()] == [11, 11]
 
 
+def test_only_tests_that_their_program_decides_are_left_out():
+    left_out = {task.key for task in tasks.planned(["native", "asan", "tsan"], False) if task.program}
+    assert left_out == {f"native/{i}_of_4" for i in range(1, 5)} | {f"asan/{i}_of_6" for i in range(1, 7)}
+
+
 @pytest.mark.parametrize(
     "line, said",
     [
@@ -123,3 +128,22 @@ def test_clang_tidy_finds_in_joined_sources_what_it_finds_in_each(tmp_path, capf
     joined.write_text("".join(f'#include "{source}"\n' for source in sources))
     assert clang_tidy.is_passed(clang_tidy.Unit(joined, sources, ["-std=c++20"], [])) == (not said)
     assert said in capfd.readouterr().out
+
+
+def test_a_unit_is_checked_again_after_a_change_of_any_file_that_it_is_compiled_with(tmp_path):
+    header, source = (tmp_path / name for name in ("one.h", "one.cpp"))
+    header.write_text("")
+    source.write_text("")
+
+    def key(joined="joined.cxx", options=("-O2",)):
+        passes.hash_of.cache_clear()
+        file = tmp_path / joined
+        file.write_text(joined)
+        return clang_tidy.key(clang_tidy.Unit(file, [source], list(options), [file, source, header]), ["version"])
+
+    keys = [key(), key("elsewhere.cxx"), key(options=("-O3",))]
+    header.write_text("// changed")
+    keys.append(key())
+    source.write_text("// changed")
+    keys.append(key())
+    assert keys[0] == keys[1] and len(set(keys)) == 4

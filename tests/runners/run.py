@@ -18,6 +18,7 @@ import threading
 import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import tasks
 from passes import Passes, hash_of, key_of
@@ -136,13 +137,16 @@ def failure_of(code, counts):
 
 
 def key(task):
-    """Returns the key of a pass of a task that its program decides, with the libraries that this loads and what these
-    read of the environment."""
+    """Returns the key of a pass of a task that its program decides, with the libraries that this loads, what these read of
+    the environment, and the instructions that the processor has."""
     listed = subprocess.run(["ldd", task.program], cwd=tasks.ROOT, check=True, capture_output=True, text=True).stdout
     libraries = re.findall(r"=> (/\S+)", listed)
     given = {name: value for name, value in os.environ.items() if re.match(r"TOLVOL_|GTEST_|\w+SAN_OPTIONS", name)}
+    flags = re.search(r"^flags.*", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
     contents = [hash_of(tasks.ROOT / path) for path in (task.program, *libraries)]
-    return key_of(task.command, sorted((given | task.environment).items()), os.cpu_count(), contents)
+    return key_of(
+        task.command, sorted((given | task.environment).items()), os.cpu_count(), flags and flags[0], contents
+    )
 
 
 class Run:

@@ -81,7 +81,8 @@ def count_checks(output):
 def native(runner, preset, name, program="tolvol_tests", only="*", environment=None):
     command = (f"build/{preset}/tests/native/{program}", "--gtest_brief=1", f"--gtest_filter={only}")
     built = "" if preset == "release" else preset
-    # These tests read no file and use no GPU, as those of tolvol_gl_tests do. What tsan sees depends on how the threads meet.
+    # The tests of tolvol_tests read no file and use no GPU. Those of tolvol_gl_tests use it, and what tsan sees depends on how
+    # the threads meet.
     decides = command[0] if program == "tolvol_tests" and preset != "tsan" else ""
     return Task(runner, name, command, count_gtest, environment or {}, built, program, decides)
 

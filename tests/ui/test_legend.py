@@ -164,11 +164,14 @@ def test_the_settings_of_the_colours_are_clicked():
         yield from reset(ramp)
         with unfolded(panels.TOLVOL_PT_show_deviation):
             yield from open_tab()
-            yield from drag_sidebar(80)  # so that the legend has room
+            # Only so does the legend have room.
+            view()[1].spaces[0].show_region_toolbar = False
+            yield from drag_sidebar(80)
             yield from settings_clicked(said, 2)
             yield from drag_sidebar(-80)
     finally:
         stop()
+        view()[1].spaces[0].show_region_toolbar = True
         bpy.context.preferences.view.ui_scale = 1
         dark()
     yield from resize(*usual)
