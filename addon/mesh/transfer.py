@@ -29,7 +29,7 @@ class Writing:
     FilledArrays: the mesh then gets their new faces first.
 
     prepare() builds a scratch mesh, which lives as long as the context. After that, `layout` tells where the result is in
-    the written mesh. Only write() changes the mesh.
+    the written mesh. Only write() changes a mesh.
 
     compact: whether prepare() ends with a copy of the scratch mesh, which frees the memory of removed elements. LOD Chain
     asks for it, because it prepares all levels before it writes the first one.
@@ -83,14 +83,12 @@ class Writing:
         for _ in self.prepare():
             pass
 
-    def made_anew(self, mesh):
-        """Takes another mesh with the same content as the present one: Blender makes all anew when it undoes a step."""
-        self._mesh = mesh
-
-    def write(self):
-        self._built.to_mesh(self._mesh)
-        self._carry.write(self._mesh, self.layout)
-        stored = column(self._mesh.vertices, "co", 3)[self.layout.result_vertices]
+    def write(self, mesh):
+        """Writes the result into `mesh`, which has the same content as the mesh that was prepared: it may be a copy, or that
+        mesh itself, which Blender makes anew when it undoes a step."""
+        self._built.to_mesh(mesh)
+        self._carry.write(mesh, self.layout)
+        stored = column(mesh.vertices, "co", 3)[self.layout.result_vertices]
         if not np.array_equal(stored.view(np.uint32), self._result.vertices.view(np.uint32)):
             raise RuntimeError("the mesh that was written is not the one that was certified")
 

@@ -129,8 +129,6 @@ object. An object without a reference gets one first, as by Set Reference"""
             # All are prepared, which checks that Blender can hold all results, before the first mesh is changed.
             writes = yield from decimation.prepared(self, stack, lambda: self._writes(outcomes))
             yield WRITE
-            for ob, write in zip(self.objects, writes):
-                write.made_anew(ob.data)
             self.finish(outcomes, writes)
 
     def _task(self, context, ob):
@@ -152,8 +150,8 @@ object. An object without a reference gets one first, as by Set Reference"""
             for ob, (_, reference, _, _) in zip(self.objects, outcomes):
                 if ob in without:
                     snapshots.set_reference(ob, reference)
-            for write in writes:
-                write.write()
+            for ob, write in zip(self.objects, writes):
+                write.write(ob.data)
             without.clear()
         for ob, outcome, write in zip(self.objects, outcomes, writes):
             shared.give(self, ob.tolvol, _SHARED if self.own_placements else {*_SHARED, "placement"})

@@ -142,8 +142,7 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             source = _source(ob)
             for write in writes:
                 meshes.append(source.copy())
-                write.made_anew(meshes[-1])
-                write.write()
+                write.write(meshes[-1])
             if ob.tolvol.snapshot is None:
                 undo.callback(snapshots.clear_reference, ob)
                 snapshots.set_reference(ob, outcomes[0][1])

@@ -24,11 +24,6 @@ def end():
     _drawing.end()
 
 
-def drawn():
-    """Whether the draw handler is there."""
-    return bool(_drawing)
-
-
 def _draw(context):
     page = legend.Page(context)
     taken = [box for box in (legend.box(context.region),) if box]

@@ -11,7 +11,10 @@ _DOT, _BESIDE = 6, 14
 
 
 def draw(context, page, taken):
-    """taken: (left, bottom, width, height) of what is drawn already. The rectangles of the labels are added."""
+    """Draws the labels of the active object where there is room.
+
+    taken: (left, bottom, width, height) of what is drawn already. The rectangles of the labels are added.
+    """
     ob = context.active_object
     if ob is None or ob.type != "MESH" or not ob.tolvol.labels or not ob.visible_in_viewport_get(context.space_data):
         return
@@ -41,7 +44,7 @@ def draw(context, page, taken):
 
 
 def draw_hover(context, page, hover, taken):
-    """hover: what the probe reads under the mouse, or None."""
+    """Draws what the probe reads under the mouse. hover: that reading, or None; taken: as for draw()."""
     if hover is None or hover.region != context.region.as_pointer() or not hover.lines:
         return
     if hover.position is not None:

@@ -46,7 +46,7 @@ def in_view(context, position):
 
 
 def _cross(page, x, y, arm):
-    """arm: the length of the arms in pixels."""
+    """Draws a cross with a gap in its middle. arm: the length of its arms in pixels."""
     scale = page.scale
     gap = _GAP * scale
     for thick, colour in ((3 * scale, EDGE), (scale, INK)):

@@ -164,10 +164,9 @@ class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):
         column = self.layout.column()
         column.active = ob.tolvol.show_deviation
         column.row().prop(ob.tolvol, "deviation_surface", expand=True)
-        if ob.tolvol.show_deviation and (reason := reasons.unsigned(ob)):
-            column.label(text=wrapped(context, reason, most=1)[0])
-        else:
-            column.row().prop(ob.tolvol, "deviation_kind", expand=True)
+        row = column.row()
+        row.enabled = not reasons.unsigned(ob)
+        row.prop(ob.tolvol, "deviation_kind", expand=True)
         column.prop(ob.tolvol, "deviation_opacity")
         legend = column.column()
         legend.use_property_split, legend.use_property_decorate = True, False

@@ -120,7 +120,7 @@ class Coverage {
   std::vector<double> distance_;   ///< No piece of the element is farther than this from it.
   /// The number of parts that find_witnesses() may still look at, when a triangle has taken its own share.
   std::size_t budget_of_first_;
-  std::size_t budget_of_beyond_;  ///< The same for triangles with a point beyond the tolerance, fewer.
+  std::size_t budget_of_beyond_;  ///< The same for triangles with a point beyond the tolerance.
   /// Counts for each triangle of the reference the pieces that it was split into, 0 while it is whole. Other threads
   /// may read a count while it changes, but it is never less than the number of pieces that exist.
   std::vector<std::atomic<std::uint32_t>> split_into_;

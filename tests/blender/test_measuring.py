@@ -86,6 +86,10 @@ def test_what_check_has_measured_is_known_in_edit_mode_without_another_measureme
     cut_a_hole(ob)
     measured()
     assert verdict.word(ob) == FAIL and verdict.of(ob) != found and len(asked) == 1
+    ob.tolvol.tolerance_percent *= 2
+    measuring.note(ob)
+    measured()
+    assert len(asked) == 2, "it was measured with another tolerance"
 
 
 def test_a_change_of_the_mesh_tolerance_or_reference_counts():

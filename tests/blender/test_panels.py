@@ -235,6 +235,7 @@ def test_no_sentence_stands_between_or_above_buttons():
         ob.modifiers.new(kind, kind)
     for name in ("sculpting", "editing", "lattice"):
         setattr(ob.tolvol.guard, name, True)
+    ob.tolvol.deviation_surface = "REFERENCE"  # of which only the magnitude is shown
     for panel in (
         *(panels.TOLVOL_PT_decimate, panels.TOLVOL_PT_smooth, panels.TOLVOL_PT_deform, panels.TOLVOL_PT_lod),
         *(panels.TOLVOL_PT_modifiers, panels.TOLVOL_PT_guard, panels.TOLVOL_PT_show_deviation),

@@ -88,7 +88,7 @@ def test_worst_point_next_and_previous_by_mouse():
         yield from press("tolvol.clear_places", across=0.775)
         yield from finished(lambda: not places.any_shown())
         yield from at_rest()
-        assert not annotations.drawn() and white_near_the_middle() < plain + 20
+        assert not annotations._drawing and white_near_the_middle() < plain + 20
         # Select Outside brings the selected faces into view, too: all of them are at two ends of the ball.
         view()[1].spaces[0].region_3d.view_distance = 50
         yield from press("tolvol.select_outside", across=0.7)

@@ -275,5 +275,5 @@ def test_the_probe_ends_when_its_object_or_file_does():
     yield from finished(lambda: not TOLVOL_OT_probe.running())
     yield from at_rest()
     assert probing.hover() is None and len(the_ball().tolvol.labels) == 1
-    assert labels.current(the_ball(), the_ball().tolvol.labels[0]) and overlay.annotations.drawn()
+    assert labels.current(the_ball(), the_ball().tolvol.labels[0]) and overlay.annotations._drawing
     screenshot("probe 8 file opened")
