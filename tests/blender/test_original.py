@@ -248,7 +248,7 @@ def test_a_decimation_that_cannot_write_the_mesh_leaves_no_reference(monkeypatch
     ob = rich()
     before = state(ob.data)
 
-    def fail(_writing):
+    def fail(_writing, _mesh):
         raise RuntimeError("no memory")
 
     monkeypatch.setattr(transfer.Writing, "write", fail)
