@@ -18,8 +18,8 @@ PERCENT = {
     "min": 1e-6,
     "max": 100.0,
     "soft_min": 0.01,
-    "soft_max": 10.0,
-    "step": 10,
+    "soft_max": 2.0,  # The slider is as wide as the panel: the less it spans, the finer it is to drag.
+    "step": 1,
     "precision": 3,
     "subtype": "PERCENTAGE",
 }

@@ -7,7 +7,8 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 from .. import preferences
 
 # How a length above 0 is entered.
-LENGTH = {"min": 1e-12, "soft_max": 1.0, "step": 1, "precision": 5, "subtype": "DISTANCE"}
+# A step is so many hundredths: an arrow adds, and a pixel of dragging, about a millimetre.
+LENGTH = {"min": 1e-12, "soft_max": 1.0, "step": 0.01, "precision": 5, "subtype": "DISTANCE"}
 
 TOLERANCE_UNITS = (
     ("PERCENT", "% of Size", "Percent of the longest diagonal of the reference's bounding box"),

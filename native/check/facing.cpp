@@ -27,8 +27,8 @@ constexpr double kNearEnough = std::numbers::pi / 180;
 constexpr double kNearlyTurned = 0.99 * std::numbers::pi;
 
 /// No dot product of a normal in a box is larger than this by more than kRounding.
-double largest_dot(const Box& box, const glm::dvec3& normal) {
-  const glm::dvec3 dots = glm::max(box.lower * normal, box.upper * normal);
+double largest_dot(const RoundedBox& box, const glm::dvec3& normal) {
+  const glm::dvec3 dots = glm::max(glm::dvec3(box.lower) * normal, glm::dvec3(box.upper) * normal);
   return dots.x + dots.y + dots.z;
 }
 
@@ -74,16 +74,14 @@ FacingRule::FacingRule(const TriangleMesh& reference, double reference_error, do
 }
 
 void FacingRule::bound_normals(const Hierarchy& hierarchy) {
+  const BoxRounding rounded;
   below_.assign(hierarchy.node_count(), {});
   hierarchy.for_each_below(
       [&](std::uint32_t node, std::uint32_t triangle) {
-        if (!std::isnan(normals[triangle].x)) below_[node].add(normals[triangle]);
+        const glm::dvec3& normal = normals[triangle];
+        if (!std::isnan(normal.x)) below_[node].add(rounded({normal, normal}));
       },
-      [&](std::uint32_t node, std::uint32_t child) {
-        if (below_[child].empty()) return;
-        below_[node].add(below_[child].lower);
-        below_[node].add(below_[child].upper);
-      });
+      [&](std::uint32_t node, std::uint32_t child) { below_[node].add(below_[child]); });
 }
 
 Hierarchy::Nearest FacingRule::nearest(const Hierarchy& hierarchy, const glm::dvec3& p, const glm::dvec3& normal,
@@ -98,7 +96,7 @@ Hierarchy::Nearest FacingRule::nearest(const Hierarchy& hierarchy, const glm::dv
 
 bool FacingRule::may_face(std::uint32_t node, const glm::dvec3& normal, double least) const {
   if (below_.empty()) return true;
-  const Box& normals_below = below_[node];
+  const RoundedBox& normals_below = below_[node];
   return !normals_below.empty() && largest_dot(normals_below, normal) >= least - kRounding;
 }
 

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "geometry/hierarchy.h"
+#include "geometry/rounded_box.h"
 #include "geometry/triangle_mesh.h"
 
 namespace tolvol {
@@ -62,7 +63,7 @@ struct FacingRule {
   double least_cosine;  ///< is that of two sure normals between which the angle is at most `angle`
 
  private:
-  std::vector<Box> below_;  ///< holds the sure normals below each node; empty before bound_normals()
+  std::vector<RoundedBox> below_;  ///< holds the sure normals below each node; empty before bound_normals()
 };
 
 /// Given as the least dot product with a normal, this admits every product above 0.

@@ -10,6 +10,7 @@
 #include "decimation/collapse_rounds.h"
 #include "decimation/decimation_input.h"
 #include "decimation/decimation_output.h"
+#include "decimation/near_input_faces.h"
 #include "decimation/refinement/refinement.h"
 
 namespace tolvol {
@@ -37,7 +38,8 @@ class Decimation {
     until([this] { return is_out_of_time(); },
           [&] {
             if (mesh.certified() && options_.crossings == DecimationOptions::Crossings::keep_out) {
-              crossings.emplace(input_.stored_mesh(), mesh.stored_mesh(), input_.faces_aside());
+              crossings.emplace(input_.stored_mesh(), mesh.stored_mesh(), input_.faces_aside(),
+                                near_input_faces(input_));
             }
             collapse_edges(mesh, crossings ? &*crossings : nullptr, target, team_, options_.progress);
           });

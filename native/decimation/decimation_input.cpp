@@ -58,8 +58,7 @@ DecimationInput::DecimationInput(std::span<const glm::dvec3> vertices, std::span
   if (volume_ && !options_.baseline && input_begins_as_reference()) own_count_ = volume_->reference().triangles.size();
   cut_ = cut_to_manifold(vertices_, triangles_, team);
   const bool has_t_junctions = join_t_junctions(joins_t_junctions, team);
-  positions_.resize(cut_.vertex_input.size());
-  for (std::size_t v = 0; v < positions_.size(); ++v) positions_[v] = space_.frame(vertices_[cut_.vertex_input[v]]);
+  positions_ = frame_mesh().vertices;
   pin();
   hold_outside_cell();
   if (has_t_junctions) pin_t_junctions(team);
@@ -160,7 +159,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   for (const std::uint32_t i : cut_.vertex_input) used.push_back(vertices_[i]);
   if (const auto warning = storage_warning(*volume_, space_, used)) report_.warnings.push_back(*warning);
   // Vertices may end up anywhere in the volume.
-  const double mapping_error = space_.mapping_error(used, 1 + volume_->frame_tolerance());
+  const double mapping_error = mapping_error_ = space_.mapping_error(used, 1 + volume_->frame_tolerance());
   const double provable = volume_->provable(mapping_error), limit = provable * (1 - kHeadroom);
   if (options_.baseline) {
     options_.baseline->begin({positions_, cut_.triangles}, space_);
@@ -337,6 +336,13 @@ void DecimationInput::cover_divided(double provable) {
   }
 }
 
+TriangleMesh DecimationInput::frame_mesh() const {
+  TriangleMesh mesh{{}, cut_.triangles};
+  mesh.vertices.reserve(cut_.vertex_input.size());
+  for (const std::uint32_t i : cut_.vertex_input) mesh.vertices.push_back(space_.frame(vertices_[i]));
+  return mesh;
+}
+
 std::vector<Corners> DecimationInput::faces_aside() const {
   std::vector<Corners> faces;
   faces.reserve(cut_.aside.size());
@@ -389,6 +395,7 @@ BoundedMeshInput DecimationInput::take_mesh() {
     }
     islands_ = island_labels(cut_.triangles, input.wedges);
   }
+  positions_ = {};
   if (options_.cell) input.cell = *options_.cell;
   input.subset = options_.placement == DecimationOptions::Placement::subset;
   input.store = [this](const glm::dvec3& p) {

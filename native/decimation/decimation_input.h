@@ -54,8 +54,8 @@ class DecimationInput {
   /// The number of places at which vertices were put into edges and triangles.
   std::size_t joined_count() const { return joined_ ? joined_->count : 0; }
   const CutMesh& cut() const { return cut_; }
-  /// The positions of the cut mesh's vertices, in the frame.
-  const std::vector<glm::dvec3>& positions() const { return positions_; }
+  /// The cut mesh, in the frame.
+  TriangleMesh frame_mesh() const;
   /// The cut mesh, with positions as they are stored; valid after take_mesh().
   MeshView stored_mesh() const { return {cut_.triangles, stored_}; }
   /// The corners, as they are stored, of the triangles that no manifold holds.
@@ -69,10 +69,12 @@ class DecimationInput {
   /// The triangles of the cut mesh that exceed the angle of the rule as they come.
   const std::vector<std::uint32_t>& exceeding() const { return exceeding_; }
 
-  /// The reference's triangles, where the input is the reference itself; else null.
-  const Hierarchy* own_hierarchy() const {
-    return own_count_ > 0 && own_count_ == triangles_.size() ? &volume_->hierarchy() : nullptr;
+  /// The volume, where the input is the reference itself; else null.
+  const ToleranceVolume* own_volume() const {
+    return own_count_ > 0 && own_count_ == triangles_.size() ? volume_ : nullptr;
   }
+  /// How far positions in the frame may be from those that the stored ones stand for; 0 without a volume.
+  double mapping_error() const { return mapping_error_; }
   /// For each of triangles(), its triangle in the cut mesh or CutMesh::kNone; empty unless the input has the vertices
   /// of the reference and begins with its triangles.
   const std::vector<std::uint32_t>& element_of() const { return element_of_; }
@@ -123,13 +125,14 @@ class DecimationInput {
   std::optional<JoinedMesh> joined_;
   std::vector<std::uint32_t> joined_wedges_;
   CutMesh cut_;
-  std::vector<glm::dvec3> positions_;
+  std::vector<glm::dvec3> positions_;  ///< Those of the cut mesh, in the frame; empty after take_mesh().
   std::vector<glm::dvec3> stored_;
   std::vector<bool> pinned_;  ///< For each vertex of the cut mesh.
   std::vector<std::uint32_t> islands_;
   /// Triangle i of the input is triangle i of the reference below this number, which is 0 or that of all triangles of
   /// the reference. All others were added, as to close holes. See is_of_reference() for pieces.
   std::size_t own_count_ = 0;
+  double mapping_error_ = 0;
   std::vector<std::uint32_t> element_of_;
   std::optional<TriangleCertificate> forward_;
   std::optional<Coverage> backward_;

@@ -16,8 +16,8 @@ namespace {
 class Output {
  public:
   Output(const DecimationInput& input, const BoundedMesh& mesh, DecimationResult& result)
-      : input_(input), cut_(input.cut()), mesh_(mesh), result_(result), same_(input.positions().size()) {
-    for (std::uint32_t v = 0; v < input.positions().size(); ++v) {
+      : input_(input), cut_(input.cut()), mesh_(mesh), result_(result), same_(cut_.vertex_input.size()) {
+    for (std::uint32_t v = 0; v < cut_.vertex_input.size(); ++v) {
       same_.join(v, cut_.output_slot[v]), same_.join(v, mesh.survivor(v));
     }
   }
@@ -25,9 +25,9 @@ class Output {
   void write() {
     // Result vertices are in the order of the input vertices that they continue.
     std::vector<std::uint32_t> order;
-    std::vector<std::uint32_t> used(input_.positions().size(), CutMesh::kNone);
+    std::vector<std::uint32_t> used(cut_.vertex_input.size(), CutMesh::kNone);
     // Copies that were several vertices of the input stay several, unless they have become one with the same vertex.
-    std::vector<std::uint32_t> chosen(input_.positions().size(), CutMesh::kNone);
+    std::vector<std::uint32_t> chosen(cut_.vertex_input.size(), CutMesh::kNone);
     const auto slot = [&](std::uint32_t v) {
       const std::uint32_t survivor = mesh_.survivor(v), same = same_.find(survivor), copy = mesh_.slot(survivor);
       if (chosen[same] == CutMesh::kNone) chosen[same] = same_.find(copy) == same ? copy : survivor;
@@ -78,7 +78,7 @@ class Output {
   void take_attributes() {
     const glm::dmat3 unit(1);
     const std::vector<std::uint32_t>& islands = input_.islands();
-    std::vector<std::uint32_t> any_corner(input_.positions().size(), CutMesh::kNone);
+    std::vector<std::uint32_t> any_corner(cut_.vertex_input.size(), CutMesh::kNone);
     for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
       for (int k = 0; k < 3; ++k) {
         std::uint32_t& corner = any_corner[cut_.triangles[t][k]];
@@ -86,7 +86,6 @@ class Output {
       }
     }
     std::optional<Hierarchy> own;
-    const TriangleMesh input{input_.positions(), cut_.triangles};
     for (std::size_t i = 0; i < kept_.size(); ++i) {
       poll_at(i);
       glm::uvec3 triangle(result_.triangle_source[i]);
@@ -107,15 +106,15 @@ class Output {
         }
         const auto same_island = [&](std::uint32_t other) { return islands.empty() || islands[other] == islands[t]; };
         const glm::dvec3& p = mesh_.position(v);
-        if (const Hierarchy* const reference = input_.own_hierarchy()) {
-          const Hierarchy::Nearest nearest = reference->nearest_if(p, [&](std::uint32_t i) {
+        if (const ToleranceVolume* const volume = input_.own_volume()) {
+          const Hierarchy::Nearest nearest = volume->hierarchy().nearest_if(p, [&](std::uint32_t i) {
             return input_.element_of()[i] != CutMesh::kNone && same_island(input_.element_of()[i]);
           });
           triangle[k] = nearest.triangle;
           weights[k] = nearest.weights;
           continue;
         }
-        if (!own) own.emplace(input);
+        if (!own) own.emplace(input_.frame_mesh());
         const Hierarchy::Nearest nearest = own->nearest_if(p, same_island);
         const std::uint32_t source = cut_.triangle_input[nearest.triangle];
         glm::dvec3 own = nearest.weights;

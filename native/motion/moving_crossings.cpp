@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Only pairs of which one face moves can begin to cross. Nearly all of these are told apart by a box or by
-// surely_uncrossed(), and the exact predicates decide about the rest.
+// Only pairs of which one face moves can begin to cross. Nearly all of these are told apart by a box.
 #include "motion/moving_crossings.h"
 
 #include <algorithm>
@@ -9,7 +8,6 @@
 
 #include "base/call.h"
 #include "base/parallel.h"
-#include "topology/faces_apart.h"
 
 namespace tolvol {
 namespace {
@@ -126,7 +124,7 @@ bool MovingCrossings::is_due(std::uint32_t face) const {
 bool MovingCrossings::triangles_cross(std::uint32_t a, const PieceTriangle& shape_a, std::uint32_t b,
                                       const PieceTriangle& shape_b) const {
   const Corners one = corners(trial_, a, shape_a), other = corners(trial_, b, shape_b);
-  return !surely_uncrossed(one, other) && faces_cross(one, other);
+  return faces_cross(one, other);
 }
 
 /// Whether the face, or a triangle of it, becomes degenerate and was not so at the start.

@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "base/call.h"
-#include "topology/faces_apart.h"
 #include "topology/faces_cross.h"
 #include "topology/near_faces.h"
 
@@ -21,7 +20,7 @@ void append_pairs(std::uint32_t i, const MeshView& mesh, const NearFaces& near, 
     if (seen++ % 256 == 0) poll();
     if (j <= i) return true;
     const Corners other = mesh.corners(j);
-    if (!surely_uncrossed(own, other) && faces_cross(own, other)) pairs.emplace_back(i, j);
+    if (faces_cross(own, other)) pairs.emplace_back(i, j);
     return true;
   });
   std::sort(pairs.begin() + before, pairs.end(), [](const glm::uvec2& a, const glm::uvec2& b) { return a.y < b.y; });

@@ -12,23 +12,25 @@ constexpr std::size_t kMany = 8;
 /// A leaf has at most this many faces. Fewer would take more nodes, and no less time.
 constexpr std::size_t kLeaf = 8;
 
-bool same(const Box& a, const Box& b) { return a.lower == b.lower && a.upper == b.upper; }
-
 }  // namespace
 
 FaceTree::FaceTree(std::span<const std::uint32_t> faces, const std::function<Box(std::size_t)>& box, Team& team)
-    : faces_(faces.begin(), faces.end()), place_(faces.size()) {
+    : place_(faces.size()) {
   if (faces.empty()) return;
+  if (faces.back() != faces.size() - 1) faces_.assign(faces.begin(), faces.end());
   struct Entry {
     glm::dvec3 centre;
     std::uint32_t index;  // among the faces
   };
   std::vector<Entry> entries(faces.size());
+  Box all;
   for (std::uint32_t i = 0; i < entries.size(); ++i) {
     poll_at(i);
     const Box of_face = box(i);
     entries[i] = {0.5 * of_face.lower + 0.5 * of_face.upper, i};
+    all.add(of_face);
   }
+  if (!all.empty()) rounding_ = BoxRounding(all.lower);
   leaves_ = std::bit_ceil((entries.size() + kLeaf - 1) / kLeaf);
   slots_of_leaf_ = (entries.size() + leaves_ - 1) / leaves_;
   // Level by level, each range of entries is cut in two at the median along the longest side of its centres' box.
@@ -53,14 +55,14 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, const std::function<Box
     next.back() = entries.size();
     border.swap(next);
   }
-  fill(boxes_, leaves_ * slots_of_leaf_, Box());
+  fill(boxes_, leaves_ * slots_of_leaf_, RoundedBox());
   fill(numbers_, boxes_.size(), 0u);
-  fill(nodes_, 2 * leaves_ - 1, Box());
+  fill(nodes_, 2 * leaves_ - 1, RoundedBox());
   for (std::size_t leaf = 0; leaf < leaves_; ++leaf) {
     poll_at(leaf);
     for (std::size_t i = border[leaf], slot = leaf * slots_of_leaf_; i < border[leaf + 1]; ++i, ++slot) {
       const std::uint32_t index = entries[i].index;
-      boxes_[slot] = box(index), numbers_[slot] = faces[index];
+      boxes_[slot] = rounding_(box(index)), numbers_[slot] = faces[index];
       place_[index] = static_cast<std::uint32_t>(slot);
     }
     fit_leaf(leaf);
@@ -72,29 +74,29 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, const std::function<Box
 }
 
 void FaceTree::fit_leaf(std::size_t leaf) {
-  Box& box = nodes_[leaves_ - 1 + leaf];
+  RoundedBox& box = nodes_[leaves_ - 1 + leaf];
   box = {};
   for (std::size_t i = leaf * slots_of_leaf_; i < (leaf + 1) * slots_of_leaf_; ++i) box.add(boxes_[i]);
 }
 
-Box FaceTree::fitted(std::size_t node) const {
-  Box box = nodes_[2 * node + 1];
+RoundedBox FaceTree::fitted(std::size_t node) const {
+  RoundedBox box = nodes_[2 * node + 1];
   box.add(nodes_[2 * node + 2]);
   return box;
 }
 
 std::size_t FaceTree::slot_of(std::uint32_t face) const {
-  if (faces_.back() == faces_.size() - 1) return place_[face];  // The tree has every number.
+  if (faces_.empty()) return place_[face];
   return place_[std::lower_bound(faces_.begin(), faces_.end(), face) - faces_.begin()];
 }
 
 void FaceTree::change(std::span<const std::uint32_t> faces, std::span<const Box> boxes) {
   if (faces.empty()) return;
-  if (faces.size() * kMany < faces_.size()) {
+  if (faces.size() * kMany < place_.size()) {
     for (std::size_t i = 0; i < faces.size(); ++i) change(faces[i], boxes[i]);
     return;
   }
-  for (std::size_t i = 0; i < faces.size(); ++i) boxes_[slot_of(faces[i])] = boxes[i];
+  for (std::size_t i = 0; i < faces.size(); ++i) boxes_[slot_of(faces[i])] = rounding_(boxes[i]);
   for (std::size_t leaf = 0; leaf < leaves_; ++leaf) fit_leaf(leaf);
   for (std::size_t node = leaves_ - 1; node-- > 0;) nodes_[node] = fitted(node);
 }
@@ -102,9 +104,9 @@ void FaceTree::change(std::span<const std::uint32_t> faces, std::span<const Box>
 double FaceTree::extent() const {
   double sum = 0;
   for (std::size_t leaf = 0; leaf < leaves_; ++leaf) {
-    const Box& box = nodes_[leaves_ - 1 + leaf];
+    const RoundedBox& box = nodes_[leaves_ - 1 + leaf];
     if (box.empty()) continue;
-    const glm::dvec3 size = box.upper - box.lower;
+    const glm::dvec3 size = glm::dvec3(box.upper) - glm::dvec3(box.lower);
     sum += size.x + size.y + size.z;
   }
   return sum;
@@ -112,12 +114,12 @@ double FaceTree::extent() const {
 
 void FaceTree::change(std::uint32_t face, const Box& box) {
   const std::size_t slot = slot_of(face), leaf = slot / slots_of_leaf_;
-  boxes_[slot] = box;
+  boxes_[slot] = rounding_(box);
   fit_leaf(leaf);
   for (std::size_t node = leaves_ - 1 + leaf; node > 0;) {
     node = (node - 1) / 2;
-    const Box box_of_both = fitted(node);
-    if (same(box_of_both, nodes_[node])) return;
+    const RoundedBox box_of_both = fitted(node);
+    if (box_of_both == nodes_[node]) return;
     nodes_[node] = box_of_both;
   }
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Two triangles that share one corner meet elsewhere exactly if the side of one opposite that corner meets the other
 // triangle: their intersection is convex, so it is the corner alone or reaches from it to such a side. Most pairs that
-// are asked about are neighbours, and most of these are told apart by the sides of the planes that their corners lie
-// on.
+// are asked about are told apart without exact arithmetic, most of the others by the sides of the planes that their
+// corners lie on.
 #include "topology/faces_cross.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
@@ -12,7 +12,7 @@
 #include <cmath>
 #include <utility>
 
-#include "geometry/lengths.h"
+#include "topology/faces_apart.h"
 
 namespace tolvol {
 namespace {
@@ -57,27 +57,6 @@ bool overlap_beside(const Point& p, const Point& q, const Point& a, const Point&
 bool beside(const Points& a, const Points& b) {
   const CGAL::Orientation one = side(a, b[1]);
   return one != CGAL::COPLANAR && side(a, b[2]) == one;
-}
-
-// A difference of two corners errs by u times itself, u = 2^-53, and a dot product by 3 u times the sum of its absolute
-// products. kDotLoss is above what is lost where a product is subnormal. Where a number is not finite, all comparisons
-// are false, and the predicates decide.
-constexpr double kDotRounding = 8 * 0x1p-53, kDotLoss = 1e-300;
-
-/// Tells whether `along` and `side` make an acute angle for sure.
-bool leads_along(const glm::dvec3& along, const glm::dvec3& side) {
-  return glm::dot(along, side) > kDotRounding * glm::dot(glm::abs(along), glm::abs(side)) + kDotLoss;
-}
-
-/// Returns true only if a plane through the corner `i` of `a`, which is the corner `k` of `b`, has all other corners of
-/// `a` on one side and those of `b` on the other. Tried is the plane between the middles of the two angles there: it
-/// tells most needles around a corner in one plane from each other, for which the predicates need exact arithmetic.
-bool apart_at_corner(const Corners& a, int i, const Corners& b, int k) {
-  const glm::dvec3 of_a[2] = {a[(i + 1) % 3] - a[i], a[(i + 2) % 3] - a[i]};
-  const glm::dvec3 of_b[2] = {b[(k + 1) % 3] - a[i], b[(k + 2) % 3] - a[i]};
-  const glm::dvec3 along = unit(unit(of_a[0]) + unit(of_a[1])) - unit(unit(of_b[0]) + unit(of_b[1]));
-  return leads_along(along, of_a[0]) && leads_along(along, of_a[1]) && leads_along(-along, of_b[0]) &&
-         leads_along(-along, of_b[1]);
 }
 
 /// For triangles that share their corners 0 and no other.
@@ -131,6 +110,7 @@ bool is_degenerate(const Corners& t) {
 }
 
 bool faces_cross(const Corners& a, const Corners& b) {
+  if (surely_uncrossed(a, b)) return false;
   const Points p = points(a), q = points(b);
   const bool thin_p = is_degenerate(a), thin_q = is_degenerate(b);
   if (thin_p && thin_q) return false;
@@ -142,7 +122,7 @@ bool faces_cross(const Corners& a, const Corners& b) {
     case 0:
       return CGAL::do_intersect(Kernel::Triangle_3(p[0], p[1], p[2]), Kernel::Triangle_3(q[0], q[1], q[2]));
     case 1:
-      return !apart_at_corner(a, i, b, k) && meet_beyond_corner(turned(p, i), turned(q, k));
+      return meet_beyond_corner(turned(p, i), turned(q, k));
     case 2: {
       const auto [j, l] = shared.at[1];
       return overlap_beside(p[i], p[j], p[3 - i - j], q[3 - k - l]);

@@ -60,16 +60,7 @@ void InputCrossings::keep_crossing(std::vector<std::uint32_t>& faces) const {
 }
 
 bool InputCrossings::crosses_another(std::uint32_t face) const {
-  std::call_once(states_ready_, [&] {
-    std::vector<std::uint32_t> all(face_count());
-    std::iota(all.begin(), all.end(), 0u);
-    std::vector<std::uint8_t> hubs = NearFaces::hubs_of(input_.triangles, input_.vertices.size());
-    if (!hubs.empty()) hubs.resize(all.size(), NearFaces::kNoHub);
-    Team alone(1);
-    near_ = NearFaces(
-        all, [&](std::size_t i) { return corners(all[i]); }, hubs, alone);
-    state_ = std::vector<std::atomic<std::uint8_t>>(all.size());
-  });
+  std::call_once(states_ready_, [&] { state_ = std::vector<std::atomic<std::uint8_t>>(face_count()); });
   std::uint8_t state = state_[face].load(std::memory_order_relaxed);
   if (state == unknown) {
     state = find_crossing(face) ? crossing : clear;
@@ -80,12 +71,29 @@ bool InputCrossings::crosses_another(std::uint32_t face) const {
 
 bool InputCrossings::find_crossing(std::uint32_t face) const {
   const Corners own = corners(face);
+  const Box box = box_of(own);
   bool found = false;
-  near_.for_each_near(own, [&](std::uint32_t other) {
-    found = other != face && faces_cross(own, corners(other));
+  const auto visit = [&](std::uint32_t other) {
+    if (other == face) return true;
+    const Corners its = corners(other);
+    found = meet(box, box_of(its)) && faces_cross(own, its);
     return !found;
-  });
+  };
+  if (find_near_ && find_near_(face, visit)) return found;
+  if (found) return true;
+  std::call_once(tree_ready_, [&] { build_tree(); });
+  near_.for_each_near(own, visit);
   return found;
+}
+
+void InputCrossings::build_tree() const {
+  std::vector<std::uint32_t> all(face_count());
+  std::iota(all.begin(), all.end(), 0u);
+  std::vector<std::uint8_t> hubs = NearFaces::hubs_of(input_.triangles, input_.vertices.size());
+  if (!hubs.empty()) hubs.resize(all.size(), NearFaces::kNoHub);
+  Team alone(1);
+  near_ = NearFaces(
+      all, [&](std::size_t i) { return corners(all[i]); }, hubs, alone);
 }
 
 }  // namespace tolvol

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <span>
 #include <vector>
@@ -15,8 +16,14 @@ namespace tolvol {
 
 class InputCrossings {
  public:
-  /// The positions are as they are stored. `fixed` are further faces, whose numbers follow on the others'. O(1).
-  InputCrossings(const MeshView& input, std::vector<Corners> fixed) : input_(input), fixed_(std::move(fixed)) {}
+  /// Calls visit(other) for the faces that a face may cross, and for others, until it returns false. Returns false if
+  /// they are so many that it has not called it for all of them.
+  using FindNear = std::function<bool(std::uint32_t face, const std::function<bool(std::uint32_t)>& visit)>;
+
+  /// The positions are as they are stored. `fixed` are further faces, whose numbers follow on the others'. Without
+  /// `find_near`, or where it does not call for all, a tree of all faces is built. O(1).
+  InputCrossings(const MeshView& input, std::vector<Corners> fixed, FindNear find_near = {})
+      : input_(input), fixed_(std::move(fixed)), find_near_(std::move(find_near)) {}
 
   Corners corners(std::uint32_t face) const {
     const std::size_t count = input_.triangles.size();
@@ -35,8 +42,8 @@ class InputCrossings {
   /// Whether crossed() holds for one of the first and one of the second. Costs as keep_crossing() does, and then about
   /// 5 ns a pair whose boxes do not meet.
   bool any_crossed(std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) const;
-  /// Takes away the faces that crossed no other. The first time it takes about 0.2 us for each face of the mesh, and 3
-  /// us for each face that it is asked about for the first time.
+  /// Takes away the faces that crossed no other. It takes about 3 us for each face that it is asked about for the first
+  /// time, and 0.2 us for each face of the mesh if it has to build the tree.
   void keep_crossing(std::vector<std::uint32_t>& faces) const;
 
  private:
@@ -44,14 +51,16 @@ class InputCrossings {
 
   bool crosses_another(std::uint32_t face) const;
   bool find_crossing(std::uint32_t face) const;
+  void build_tree() const;
   void find_sheets() const;
 
   MeshView input_;
   std::vector<Corners> fixed_;
-  mutable std::once_flag sheets_known_, states_ready_;
+  FindNear find_near_;
+  mutable std::once_flag sheets_known_, states_ready_, tree_ready_;
   mutable std::vector<std::uint32_t> sheets_;             ///< per face, found when first needed
   mutable NearFaces near_;                                ///< all faces, made when first needed
-  mutable std::vector<std::atomic<std::uint8_t>> state_;  ///< per face: a State, made with the tree
+  mutable std::vector<std::atomic<std::uint8_t>> state_;  ///< per face: a State, made when first needed
 };
 
 }  // namespace tolvol

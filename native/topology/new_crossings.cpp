@@ -75,8 +75,9 @@ struct Ring {
 
 }  // namespace
 
-NewCrossings::NewCrossings(const MeshView& input, const MeshView& now, std::vector<Corners> fixed)
-    : now_(now), input_(input, std::move(fixed)), origins_(input_.face_count()) {}
+NewCrossings::NewCrossings(const MeshView& input, const MeshView& now, std::vector<Corners> fixed,
+                           InputCrossings::FindNear find_near)
+    : now_(now), input_(input, std::move(fixed), std::move(find_near)), origins_(input_.face_count()) {}
 
 std::vector<std::uint32_t> NewCrossings::origins_of(std::uint32_t face, std::span<const Removed> removed) const {
   std::vector<std::uint32_t> found;

@@ -27,8 +27,9 @@ class NewCrossings {
  public:
   /// `input` and `now` are the mesh as it came in and as it is, with the same numbers of faces; positions are as they
   /// are stored. Both are read whenever something is asked. `fixed` are further faces, which never change; their
-  /// numbers follow on the others'. O(n).
-  NewCrossings(const MeshView& input, const MeshView& now, std::vector<Corners> fixed);
+  /// numbers follow on the others'. `find_near` finds faces of the input (topology/input_crossings.h). O(n).
+  NewCrossings(const MeshView& input, const MeshView& now, std::vector<Corners> fixed,
+               InputCrossings::FindNear find_near = {});
 
   /// A face as a change would leave it, with another shape than now.
   struct Face {

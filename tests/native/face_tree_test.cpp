@@ -35,7 +35,9 @@ FaceTree tree_of(const std::vector<Box>& boxes, Team& team) {
   return FaceTree(faces, boxes, team);
 }
 
-std::set<std::uint32_t> among(const std::vector<Box>& boxes, const Box& box) {
+/// The faces that are at most `apart` from a box along each axis.
+std::set<std::uint32_t> among(const std::vector<Box>& boxes, Box box, double apart) {
+  box.lower -= apart, box.upper += apart;
   std::set<std::uint32_t> faces;
   for (std::uint32_t i = 0; i < boxes.size(); ++i) {
     if (meet(boxes[i], box)) faces.insert(3 * i);
@@ -44,19 +46,29 @@ std::set<std::uint32_t> among(const std::vector<Box>& boxes, const Box& box) {
 }
 
 TEST(FaceTree, FindsWhatMeetsABoxWhileFacesChangeAndVanish) {
-  Random random(5);
-  Team team(2);
-  for (const std::size_t count : {0u, 1u, 8u, 9u, 16u, 65u, 300u, 1025u}) {
-    std::vector<Box> boxes(count);
-    for (Box& box : boxes) box = random_box(random);
-    FaceTree tree = tree_of(boxes, team);
-    for (int i = 0; i < 300; ++i) {
-      const Box box = random_box(random);
-      ASSERT_EQ(found(tree, box), among(boxes, box));
-      if (count == 0) continue;
-      const std::uint32_t face = random.below(static_cast<unsigned>(count));
-      boxes[face] = random.below(3) > 0 ? random_box(random) : Box();
-      tree.change(3 * face, boxes[face]);
+  // Far from the origin, too, where a float32 does not tell the boxes apart.
+  for (const double far : {0.0, 1e9}) {
+    Random random(5);
+    Team team(2);
+    for (const std::size_t count : {0u, 1u, 8u, 9u, 16u, 65u, 300u, 1025u}) {
+      std::vector<Box> boxes(count);
+      const auto next_box = [&] {
+        Box box = random_box(random);
+        box.lower += far, box.upper += far;
+        return box;
+      };
+      for (Box& box : boxes) box = next_box();
+      FaceTree tree = tree_of(boxes, team);
+      for (int i = 0; i < 300; ++i) {
+        const Box box = next_box();
+        const std::set<std::uint32_t> near = found(tree, box), wanted = among(boxes, box, 0);
+        ASSERT_TRUE(std::ranges::includes(near, wanted));
+        ASSERT_TRUE(std::ranges::includes(among(boxes, box, 1e-5), near));
+        if (count == 0) continue;
+        const std::uint32_t face = random.below(static_cast<unsigned>(count));
+        boxes[face] = random.below(3) > 0 ? next_box() : Box();
+        tree.change(3 * face, boxes[face]);
+      }
     }
   }
 }
