@@ -395,7 +395,7 @@ BoundedMeshInput DecimationInput::take_mesh() {
     }
     islands_ = island_labels(cut_.triangles, input.wedges);
   }
-  positions_ = {};
+  positions_ = {}, cut_.stand_in = {};  // These are not needed any more.
   if (options_.cell) input.cell = *options_.cell;
   input.subset = options_.placement == DecimationOptions::Placement::subset;
   input.store = [this](const glm::dvec3& p) {

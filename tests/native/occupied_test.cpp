@@ -27,6 +27,18 @@ TEST(Occupied, HoldsAPlaceUntilTheLastHasLeftIt) {
   EXPECT_FALSE(occupied.contains({0, 1, 2}));
 }
 
+TEST(Occupied, APlaceThatVeryManyHaveHadStaysOccupied) {
+  constexpr int kMany = 70'000;
+  Occupied occupied;
+  for (int i = 0; i < kMany; ++i) occupied.add({0, 1, 2}), occupied.add({double(i), 0, 0});
+  for (int i = 0; i < kMany; ++i) {
+    EXPECT_TRUE(occupied.contains({0, 1, 2}));
+    occupied.remove({0, 1, 2}), occupied.remove({double(i), 0, 0});
+    EXPECT_FALSE(occupied.contains({double(i), 0, 0}));
+  }
+  EXPECT_TRUE(occupied.contains({0, 1, 2}));
+}
+
 TEST(Occupied, NoVertexIsPutWhereAnotherIs) {
   // Two flat sheets, one close above the other: nothing but the other sheet's vertex is in the way.
   constexpr unsigned kSide = 8;
