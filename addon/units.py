@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Converts lengths between numbers and the text that the user reads or types, in the units of the scene."""
 
+import re
+
 import bpy
 import numpy as np
 
@@ -38,7 +40,8 @@ def _of_power(context, value, category, power):
     if units.system != "NONE" and abs(value) < _LARGEST:
         text = bpy.utils.units.to_string(units.system, category, value * units.scale_length**power, precision=3)
         if value == 0 or any(digit in "123456789" for digit in text):
-            return text.replace(" ", NO_BREAK)
+            grouped = re.sub(r"^-?\d+", lambda whole: f"{int(whole[0]):,}", text)
+            return grouped.replace(" ", NO_BREAK)
     return f"{value:.3g}"
 
 

@@ -124,9 +124,9 @@ a table (.csv) or all numbers (.json)"""
         folder = Path(bpy.data.filepath).parent
         if not bpy.data.filepath or not folder.is_dir():
             folder = Path.home()
-        self.filepath = str(
-            folder / f"{bpy.path.clean_name(context.active_object.name)} deviation{_ending(self.format)}"
-        )
+        # A page of several objects is not named after one of them.
+        about = context.active_object.name if len(targets(context)) == 1 else "objects"
+        self.filepath = str(folder / f"{bpy.path.clean_name(about)} deviation{_ending(self.format)}")
         self._named_for = self.format
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}

@@ -384,6 +384,30 @@ def test_a_length_typed_in_millimetres():
     units.scale_length, units.length_unit = 1.0, "METERS"
 
 
+def test_a_pixel_of_dragging_changes_the_tolerance_by_little():
+    yield from reset(monkey)
+    yield from open_tab()
+    settings = suzanne().tolvol
+    for mode, name, start, most in (
+        ("LENGTH", "tolerance_length", 0.005, 0.001),
+        ("PERCENT", "tolerance_percent", 0.2, 0.03),
+    ):
+        settings.tolerance_mode = mode
+        setattr(settings, name, start)
+        yield from at_rest(beside=())
+        x, y = yield from find_property(name, 0.6)
+        xdotool("mousemove", x, y)
+        yield
+        xdotool("mousedown", 1)
+        yield
+        for pixel in range(1, 25):
+            xdotool("mousemove", x + pixel, y)
+            yield
+        xdotool("mouseup", 1)
+        yield from at_rest(beside=())
+        assert start < getattr(settings, name) <= start + 24.01 * most
+
+
 def test_the_lines_of_an_error_have_room_in_blenders_popup():
     yield from reset(scenes.moved_up)
     ob = bpy.context.object
