@@ -26,12 +26,12 @@ def length(context, value):
 
 
 def area(context, value):
-    """Returns an area of the world as text in the scene's units."""
+    """Returns an area of the world as text in the scene's units, with separators of thousands."""
     return _of_power(context, value, "AREA", 2)
 
 
 def volume(context, value):
-    """Returns a volume in the world as text in the scene's units."""
+    """Returns a volume in the world as text in the scene's units, with separators of thousands."""
     return _of_power(context, value, "VOLUME", 3)
 
 
@@ -40,7 +40,7 @@ def _of_power(context, value, category, power):
     if units.system != "NONE" and abs(value) < _LARGEST:
         text = bpy.utils.units.to_string(units.system, category, value * units.scale_length**power, precision=3)
         if value == 0 or any(digit in "123456789" for digit in text):
-            grouped = re.sub(r"^-?\d+", lambda whole: f"{int(whole[0]):,}", text)
+            grouped = re.sub(r"\d+", lambda whole: f"{int(whole[0]):,}", text, count=1)
             return grouped.replace(" ", NO_BREAK)
     return f"{value:.3g}"
 

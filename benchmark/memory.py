@@ -41,7 +41,8 @@ def held():
 
 
 class Peak:
-    """Sees how many bytes this process holds at most within its scope. That of the system would begin with the process."""
+    """Sees how many bytes this process holds at most within its scope. The peak that the system reports counts from the start
+    of the process."""
 
     def __enter__(self):
         self.bytes, self._ended = held(), threading.Event()
@@ -72,13 +73,14 @@ def measure(count, percent):
             built = time.perf_counter()
             result = tolvol.decimate(vertices, triangles, volume)
             ended = time.perf_counter()
-            del volume
+            left = len(result.triangles)
+            del volume, result
     return {
         "triangles": len(triangles),
         "volume": built - began,
         "decimation": ended - built,
         "bytes": (peak.bytes - before) / len(triangles),
-        "left": len(result.triangles),
+        "left": left,
     }
 
 

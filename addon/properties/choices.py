@@ -7,7 +7,7 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 from .. import preferences
 
 # How a length above 0 is entered.
-# A step is so many hundredths: an arrow adds, and a pixel of dragging, about a millimetre.
+# Blender 3.4 makes of this step one of a millimetre: for a pixel of dragging, or a click on an arrow.
 LENGTH = {"min": 1e-12, "soft_max": 1.0, "step": 0.01, "precision": 5, "subtype": "DISTANCE"}
 
 TOLERANCE_UNITS = (

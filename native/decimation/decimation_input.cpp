@@ -58,7 +58,7 @@ DecimationInput::DecimationInput(std::span<const glm::dvec3> vertices, std::span
   if (volume_ && !options_.baseline && input_begins_as_reference()) own_count_ = volume_->reference().triangles.size();
   cut_ = cut_to_manifold(vertices_, triangles_, team);
   const bool has_t_junctions = join_t_junctions(joins_t_junctions, team);
-  positions_ = frame_mesh().vertices;
+  positions_ = frame_positions();
   pin();
   hold_outside_cell();
   if (has_t_junctions) pin_t_junctions(team);
@@ -336,11 +336,11 @@ void DecimationInput::cover_divided(double provable) {
   }
 }
 
-TriangleMesh DecimationInput::frame_mesh() const {
-  TriangleMesh mesh{{}, cut_.triangles};
-  mesh.vertices.reserve(cut_.vertex_input.size());
-  for (const std::uint32_t i : cut_.vertex_input) mesh.vertices.push_back(space_.frame(vertices_[i]));
-  return mesh;
+std::vector<glm::dvec3> DecimationInput::frame_positions() const {
+  std::vector<glm::dvec3> positions;
+  positions.reserve(cut_.vertex_input.size());
+  for (const std::uint32_t i : cut_.vertex_input) positions.push_back(space_.frame(vertices_[i]));
+  return positions;
 }
 
 std::vector<Corners> DecimationInput::faces_aside() const {
@@ -395,7 +395,8 @@ BoundedMeshInput DecimationInput::take_mesh() {
     }
     islands_ = island_labels(cut_.triangles, input.wedges);
   }
-  positions_ = {}, cut_.stand_in = {};  // These are not needed any more.
+  // The assignment of {} would keep the memory.
+  positions_ = std::vector<glm::dvec3>(), cut_.stand_in = std::vector<std::uint32_t>();
   if (options_.cell) input.cell = *options_.cell;
   input.subset = options_.placement == DecimationOptions::Placement::subset;
   input.store = [this](const glm::dvec3& p) {

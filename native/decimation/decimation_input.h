@@ -53,9 +53,10 @@ class DecimationInput {
   glm::dmat3 weights_in_parent(std::uint32_t triangle) const;
   /// The number of places at which vertices were put into edges and triangles.
   std::size_t joined_count() const { return joined_ ? joined_->count : 0; }
+  /// Its `mates` and `stand_in` are empty after take_mesh().
   const CutMesh& cut() const { return cut_; }
   /// The cut mesh, in the frame.
-  TriangleMesh frame_mesh() const;
+  TriangleMesh frame_mesh() const { return {frame_positions(), cut_.triangles}; }
   /// The cut mesh, with positions as they are stored; valid after take_mesh().
   MeshView stored_mesh() const { return {cut_.triangles, stored_}; }
   /// The corners, as they are stored, of the triangles that no manifold holds.
@@ -90,6 +91,7 @@ class DecimationInput {
 
  private:
   Frame own_frame() const;
+  std::vector<glm::dvec3> frame_positions() const;
   void pin();
   void hold_outside_cell();
   void hold_near(std::span<const Part> pieces, const TriangleMesh& elements, double provable);

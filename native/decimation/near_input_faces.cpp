@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The frame is an affine image of the positions as they are stored, so that the images of faces that cross have a point
-// in common. It is in the smallest sphere around the centre of one face that has its corners, and on the other face. In
-// the frame each corner is off by at most the mapping error: the other face is found within twice the error of the
-// sphere.
+// in common. This point is in the smallest sphere around the centre of one face that has its corners, and on the other
+// face. In the frame each corner is off by at most the mapping error: the other face is found within twice the error of
+// the sphere, and 16 u more for the rounding of its radius.
 #include "decimation/near_input_faces.h"
 
 #include <algorithm>
@@ -16,8 +16,8 @@ namespace tolvol {
 namespace {
 
 /// The sphere around a needle may have very many others, although few are in its box. Once all searches together have
-/// visited so many faces for each face of the input, which takes as long as to build a tree, none begins any more.
-constexpr std::size_t kMost = 8;
+/// visited so many faces for each face of the input, none begins any more. All faces of a scan together visit fewer.
+constexpr std::size_t kMostVisits = 32;
 
 }  // namespace
 
@@ -26,7 +26,7 @@ InputCrossings::FindNear near_input_faces(const DecimationInput& input) {
   if (!volume) return {};
   const auto visited = std::make_shared<std::atomic<std::size_t>>(0);
   return [&input, volume, visited](std::uint32_t face, const std::function<bool(std::uint32_t)>& visit) {
-    const std::size_t most = kMost * input.triangles().size();
+    const std::size_t most = kMostVisits * input.triangles().size();
     if (visited->load(std::memory_order_relaxed) > most) return false;
     const CutMesh& cut = input.cut();
     const auto count = static_cast<std::uint32_t>(cut.triangles.size());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// The faces near a face of the input, by the hierarchy of the reference, where the input is the reference itself. A
-/// tree of the input alone takes more memory, and a fifth of a second for a million faces.
+/// tree for the input would take 40 to 55 bytes a face more, and 0.2 s for a million faces.
 #pragma once
 
 #include "decimation/decimation_input.h"
@@ -8,8 +8,8 @@
 
 namespace tolvol {
 
-/// Returns nothing where the input is not the reference. It keeps a reference to the input, whose mesh was taken, and
-/// may be asked by several threads at once. About 3 us a face.
+/// Returns nothing where the input is not the reference. The function that is returned keeps a reference to the input,
+/// and may be called by several threads at once. A call takes about 1 us for a face of a scan.
 InputCrossings::FindNear near_input_faces(const DecimationInput& input);
 
 }  // namespace tolvol

@@ -12,8 +12,8 @@
 namespace tolvol {
 
 /// A hash table with open addressing, which is several times as fast as std::unordered_map: every collapse asks it. A
-/// slot has 48 bits of a hash and 16 bits that count. Two places with the same 48 bits, by chance one pair in 2^48, only
-/// cost a vertex a free place. So does a place that so many vertices had that the count is full: it stays occupied.
+/// slot has 48 bits of a hash and 16 bits that count. Two places with the same 48 bits, by chance one pair in 2^48,
+/// only cost a vertex a free place. So does a place at which 65,535 vertices were at once: it stays occupied.
 class Occupied {
  public:
   void add(const glm::dvec3& place) {

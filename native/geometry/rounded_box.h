@@ -30,15 +30,21 @@ inline bool meet(const RoundedBox& a, const RoundedBox& b) {
          a.lower.z <= b.upper.z && b.lower.z <= a.upper.z;
 }
 
-/// Rounds boxes. The nearer they are to the origin the less they grow: by two float32 ulps of their distance at most.
+/// Rounds boxes. On each side a box grows by at most 2.5 times the distance of two float32 at its distance from the
+/// origin, by 2^-126 of `size`, and by 2^-50 of the origin's own distance from 0.
 class BoxRounding {
  public:
-  explicit BoxRounding(const glm::dvec3& origin = glm::dvec3(0)) : origin_(origin) {
+  /// Most coordinates should lie around the origin, at distances about or below `size`, which is not negative.
+  explicit BoxRounding(const glm::dvec3& origin = glm::dvec3(0), double size = 1) : origin_(origin) {
+    int exponent = 0;
+    std::frexp(std::clamp(size, 0x1p-900, 0x1p900), &exponent);
+    scale_ = std::ldexp(1.0, -exponent), unscale_ = std::ldexp(1.0, exponent);
     const glm::dvec3 slack = 4 * std::numeric_limits<double>::epsilon() * glm::abs(origin);
     below_ = origin - slack, above_ = origin + slack;
   }
 
-  /// Two boxes that meet do so after they were rounded: every step of it is monotone. An empty box stays empty.
+  /// Two boxes that meet do so after they were rounded: rounding keeps the order of numbers, and both only grow. An
+  /// empty box stays empty.
   RoundedBox operator()(const Box& box) const {
     RoundedBox rounded;
     if (box.empty()) return rounded;
@@ -54,9 +60,10 @@ class BoxRounding {
     Box box;
     if (rounded.empty()) return box;
     for (int k = 0; k < 3; ++k) {
-      constexpr double kInfinity = std::numeric_limits<double>::infinity();
-      box.lower[k] = rounded.lower[k] <= -kFarthest ? -kInfinity : below_[k] + static_cast<double>(rounded.lower[k]);
-      box.upper[k] = rounded.upper[k] >= kFarthest ? kInfinity : above_[k] + static_cast<double>(rounded.upper[k]);
+      constexpr double kInfinity = std::numeric_limits<double>::infinity(), kMost = std::numeric_limits<double>::max();
+      const double lower = rounded.lower[k], upper = rounded.upper[k];
+      box.lower[k] = lower <= -kFarthest ? -kInfinity : std::min(below_[k] + lower * unscale_, kMost);
+      box.upper[k] = upper >= kFarthest ? kInfinity : std::max(above_[k] + upper * unscale_, -kMost);
     }
     return box;
   }
@@ -66,8 +73,9 @@ class BoxRounding {
   /// empty meets one that is.
   static constexpr float kFarthest = 1e38f;
 
-  static float nearest(double x) {
-    return static_cast<float>(std::clamp(x, static_cast<double>(-kFarthest), static_cast<double>(kFarthest)));
+  float nearest(double from_origin) const {
+    constexpr double kMost = kFarthest;
+    return static_cast<float>(std::clamp(from_origin * scale_, -kMost, kMost));
   }
   /// At least the distance to the next float32 on either side.
   static float ulp(float x) {
@@ -75,6 +83,7 @@ class BoxRounding {
   }
 
   glm::dvec3 origin_, below_, above_;
+  double scale_, unscale_;  // Powers of two, so that products with them are exact.
 };
 
 }  // namespace tolvol

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
 namespace tolvol {
 namespace {
@@ -11,6 +12,24 @@ namespace {
 constexpr std::size_t kMany = 8;
 /// A leaf has at most this many faces. Fewer would take more nodes, and no less time.
 constexpr std::size_t kLeaf = 8;
+
+/// The place around which most faces lie is that of so many.
+constexpr std::size_t kSome = 1024;
+
+/// Returns a point around which most of some points lie, however far away the others are. Points that are not finite
+/// count as far away.
+glm::dvec3 median(std::vector<glm::dvec3>& points) {
+  glm::dvec3 middle(0);
+  std::erase_if(points, [](const glm::dvec3& p) { return !std::isfinite(p.x + p.y + p.z); });
+  if (points.empty()) return middle;
+  const auto half = points.begin() + static_cast<std::ptrdiff_t>(points.size() / 2);
+  for (int k = 0; k < 3; ++k) {
+    std::nth_element(points.begin(), half, points.end(),
+                     [k](const glm::dvec3& a, const glm::dvec3& b) { return a[k] < b[k]; });
+    middle[k] = (*half)[k];
+  }
+  return middle;
+}
 
 }  // namespace
 
@@ -30,7 +49,12 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, const std::function<Box
     entries[i] = {0.5 * of_face.lower + 0.5 * of_face.upper, i};
     all.add(of_face);
   }
-  if (!all.empty()) rounding_ = BoxRounding(all.lower);
+  if (!all.empty()) {
+    std::vector<glm::dvec3> some;
+    for (std::size_t i = 0; i < entries.size(); i += 1 + entries.size() / kSome) some.push_back(entries[i].centre);
+    const glm::dvec3 size = all.upper - all.lower;
+    rounding_ = BoxRounding(median(some), std::max({size.x, size.y, size.z}));
+  }
   leaves_ = std::bit_ceil((entries.size() + kLeaf - 1) / kLeaf);
   slots_of_leaf_ = (entries.size() + leaves_ - 1) / leaves_;
   // Level by level, each range of entries is cut in two at the median along the longest side of its centres' box.
@@ -104,9 +128,9 @@ void FaceTree::change(std::span<const std::uint32_t> faces, std::span<const Box>
 double FaceTree::extent() const {
   double sum = 0;
   for (std::size_t leaf = 0; leaf < leaves_; ++leaf) {
-    const RoundedBox& box = nodes_[leaves_ - 1 + leaf];
+    const Box box = rounding_.around(nodes_[leaves_ - 1 + leaf]);
     if (box.empty()) continue;
-    const glm::dvec3 size = glm::dvec3(box.upper) - glm::dvec3(box.lower);
+    const glm::dvec3 size = box.upper - box.lower;
     sum += size.x + size.y + size.z;
   }
   return sum;

@@ -16,8 +16,9 @@
 
 namespace tolvol {
 
-/// A balanced tree of boxes, cut at medians. Several threads may search it at once while none changes it. Which faces a
-/// search finds depends on the boxes alone; their order also depends on the boxes that the tree was built with.
+/// A balanced tree of boxes, cut at medians. Several threads may search it at once while none changes it. The order of
+/// the faces that a search finds, and which it finds beside those that it has to find, depends on the boxes that the
+/// tree was built with.
 class FaceTree {
  public:
   FaceTree() = default;
@@ -62,13 +63,13 @@ class FaceTree {
   template <class May, class Visit>
   void search(May&& may, Visit&& visit) const;
 
-  BoxRounding rounding_;                ///< from a corner of the box around all faces when the tree was built
+  BoxRounding rounding_;                ///< from where most faces were when the tree was built
   std::size_t leaves_ = 0;              ///< a power of two, or 0 without faces
   std::vector<RoundedBox> nodes_;       ///< the root first; the children of node i are 2 i + 1 and 2 i + 2; leaves last
   std::size_t slots_of_leaf_ = 0;       ///< the number of slots of each leaf: the most faces in one
   std::vector<RoundedBox> boxes_;       ///< per slot; empty where the leaf has fewer faces
   std::vector<std::uint32_t> numbers_;  ///< per slot: its face
-  std::vector<std::uint32_t> faces_;    ///< in rising order; empty if they are all from 0 on
+  std::vector<std::uint32_t> faces_;    ///< in rising order; empty if the numbers are 0, 1, 2 and so on
   std::vector<std::uint32_t> place_;    ///< per face of faces_: its slot
 };
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "geometry/lengths.h"
+#include "topology/shared_corners.h"
 
 namespace tolvol {
 namespace {
@@ -97,7 +98,9 @@ int side(const dvec3& u, const dvec3& v, const dvec3& p) {
 bool apart_beyond_corner(const dvec3& a1, const dvec3& a2, const dvec3& b1, const dvec3& b2) {
   if (const int s = side(a1, a2, b1); s != 0 && side(a1, a2, b2) == s) return true;
   if (const int s = side(b1, b2, a1); s != 0 && side(b1, b2, a2) == s) return true;
-  const dvec3 u = glm::normalize(b1) + glm::normalize(b2) - glm::normalize(a1) - glm::normalize(a2);
+  // A plane between the middles of the two angles tells most needles around a corner in one plane from each other, for
+  // which the predicates need exact arithmetic.
+  const dvec3 u = unit(unit(b1) + unit(b2)) - unit(unit(a1) + unit(a2));
   const double error = kRounding * sum(u) * std::max({largest(a1), largest(a2), largest(b1), largest(b2)}) + kSmallest;
   return glm::dot(u, a1) < -error && glm::dot(u, a2) < -error && glm::dot(u, b1) > error && glm::dot(u, b2) > error;
 }
@@ -116,17 +119,9 @@ double gap(const Corners& a, const Corners& b, double enough) {
 }
 
 bool surely_uncrossed(const Corners& a, const Corners& b) {
-  int count = 0;
-  std::array<std::pair<int, int>, 3> shared;
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      if (a[i] != b[k]) continue;
-      shared[count++] = {i, k};
-      break;
-    }
-  }
-  const auto [i, k] = shared[0];
-  switch (count) {
+  const SharedCorners shared = shared_corners(a, b);
+  const auto [i, k] = shared.at[0];
+  switch (shared.count) {
     case 0: {
       const Pair pair = pair_of(a, b);
       bool apart = false;
@@ -139,7 +134,7 @@ bool surely_uncrossed(const Corners& a, const Corners& b) {
                                  b[(k + 2) % 3] - corner);
     }
     case 2: {
-      const auto [j, l] = shared[1];
+      const auto [j, l] = shared.at[1];
       const dvec3& corner = a[i];
       if (k == l) return false;  // two corners of the first triangle are one point
       return side(a[j] - corner, a[3 - i - j] - corner, b[3 - k - l] - corner) != 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Quick proofs that triangles do not cross (topology/faces_cross.h), for those who ask about many.
+/// Quick proofs that triangles do not cross, which faces_cross() tries first, and that they are apart.
 #pragma once
 
 #include <array>

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "topology/faces_apart.h"
+#include "topology/shared_corners.h"
 
 namespace tolvol {
 namespace {
@@ -29,24 +30,6 @@ CGAL::Orientation side(const Points& t, const Point& p) { return CGAL::orientati
 
 /// Turns `t` so that its corner `first` comes first; the orientation stays.
 Points turned(const Points& t, int first) { return {t[first], t[(first + 1) % 3], t[(first + 2) % 3]}; }
-
-/// The pairs of equal corners, which are at most three.
-struct Shared {
-  int count = 0;
-  std::array<std::pair<int, int>, 3> at{};
-};
-
-Shared shared_corners(const Corners& a, const Corners& b) {
-  Shared shared;
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      if (a[i] != b[k]) continue;
-      shared.at[shared.count++] = {i, k};
-      break;
-    }
-  }
-  return shared;
-}
 
 /// Whether the two triangles on the edge (p, q) overlap: they are in one plane, on one side of the edge.
 bool overlap_beside(const Point& p, const Point& q, const Point& a, const Point& b) {
@@ -74,7 +57,7 @@ bool enters(const Points& t, const Point& p) {
 }
 
 /// For a triangle `t` and a degenerate one.
-bool crosses_degenerate(const Points& t, const Points& degenerate, const Shared& shared) {
+bool crosses_degenerate(const Points& t, const Points& degenerate, const SharedCorners& shared) {
   if (shared.count > 1) return false;  // the line of an edge of t meets t in that edge alone
   if (shared.count == 1) {
     const auto [corner, own] = shared.at[0];
@@ -109,14 +92,13 @@ bool is_degenerate(const Corners& t) {
   return CGAL::collinear(p[0], p[1], p[2]);
 }
 
-bool faces_cross(const Corners& a, const Corners& b) {
-  if (surely_uncrossed(a, b)) return false;
+bool faces_cross_exactly(const Corners& a, const Corners& b) {
   const Points p = points(a), q = points(b);
   const bool thin_p = is_degenerate(a), thin_q = is_degenerate(b);
   if (thin_p && thin_q) return false;
   if (thin_q) return crosses_degenerate(p, q, shared_corners(a, b));
   if (thin_p) return crosses_degenerate(q, p, shared_corners(b, a));
-  const Shared shared = shared_corners(a, b);
+  const SharedCorners shared = shared_corners(a, b);
   const auto [i, k] = shared.at[0];
   switch (shared.count) {
     case 0:
@@ -131,5 +113,7 @@ bool faces_cross(const Corners& a, const Corners& b) {
       return true;
   }
 }
+
+bool faces_cross(const Corners& a, const Corners& b) { return !surely_uncrossed(a, b) && faces_cross_exactly(a, b); }
 
 }  // namespace tolvol

@@ -19,4 +19,7 @@ bool is_degenerate(const Corners& t);
 /// O(1), 10 ns to 1 us; more where predicates need exact arithmetic.
 bool faces_cross(const Corners& a, const Corners& b);
 
+/// The same by the predicates alone, which judge surely_uncrossed() in the tests. O(1), 20 ns to 1 us, or more.
+bool faces_cross_exactly(const Corners& a, const Corners& b);
+
 }  // namespace tolvol

@@ -80,7 +80,6 @@ bool InputCrossings::find_crossing(std::uint32_t face) const {
     return !found;
   };
   if (find_near_ && find_near_(face, visit)) return found;
-  if (found) return true;
   std::call_once(tree_ready_, [&] { build_tree(); });
   near_.for_each_near(own, visit);
   return found;

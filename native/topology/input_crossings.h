@@ -17,11 +17,12 @@ namespace tolvol {
 class InputCrossings {
  public:
   /// Calls visit(other) for the faces that a face may cross, and for others, until it returns false. Returns false if
-  /// they are so many that it has not called it for all of them.
+  /// it has called it for none, because that would take too long.
   using FindNear = std::function<bool(std::uint32_t face, const std::function<bool(std::uint32_t)>& visit)>;
 
   /// The positions are as they are stored. `fixed` are further faces, whose numbers follow on the others'. Without
-  /// `find_near`, or where it does not call for all, a tree of all faces is built. O(1).
+  /// `find_near`, and where that returns false, faces are searched in a tree, which is built when it is first needed.
+  /// O(1).
   InputCrossings(const MeshView& input, std::vector<Corners> fixed, FindNear find_near = {})
       : input_(input), fixed_(std::move(fixed)), find_near_(std::move(find_near)) {}
 

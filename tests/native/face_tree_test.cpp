@@ -13,6 +13,7 @@ namespace {
 using tolvol::Box;
 using tolvol::FaceTree;
 using tolvol::Team;
+using tolvol::TriangleMesh;
 using tolvol::shapes::Random;
 
 Box random_box(Random& random) {
@@ -69,6 +70,30 @@ TEST(FaceTree, FindsWhatMeetsABoxWhileFacesChangeAndVanish) {
         boxes[face] = random.below(3) > 0 ? next_box() : Box();
         tree.change(3 * face, boxes[face]);
       }
+    }
+  }
+}
+
+// A float32 would not tell the boxes apart if it counted from the outlier, or without a unit that suits them.
+TEST(FaceTree, FindsFewFacesBesideAnOutlierAndAtAnySize) {
+  Team team(1);
+  for (const double size : {1.0, 1e-200, 1e200}) {
+    for (const double outlier : {0.0, -1e6, 1e6}) {
+      const TriangleMesh torus = tolvol::shapes::torus(20);
+      std::vector<Box> boxes;
+      for (std::uint32_t t = 0; t < torus.triangles.size(); ++t) {
+        boxes.emplace_back();
+        for (int k = 0; k < 3; ++k) boxes.back().add(size * torus.vertices[torus.triangles[t][k]]);
+      }
+      boxes.push_back({glm::dvec3(size * outlier), glm::dvec3(size * outlier)});
+      const FaceTree tree = tree_of(boxes, team);
+      std::size_t visits = 0, meeting = 0;
+      for (const Box& box : boxes) {
+        visits += found(tree, box).size(), meeting += among(boxes, box, 0).size();
+        tree.for_each_where([&](const Box& around) { return meet(around, box); }, [&](std::uint32_t) { ++visits; });
+      }
+      EXPECT_GE(visits, 2 * meeting);
+      EXPECT_LE(visits, 2.2 * double(meeting)) << size << ", " << outlier;
     }
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Judged by exact predicates (topology/faces_cross.h), and by distances of points of both triangles.
+// Judged by exact predicates alone (faces_cross_exactly()), and by distances of points of both triangles.
 #include "topology/faces_apart.h"
 
 #include <gtest/gtest.h>
@@ -47,7 +47,7 @@ TEST(FacesApart, TheGapIsNeverLargerThanTheDistanceOfTwoPoints) {
     EXPECT_LE(enough, apart);
     if (apart == 0) continue;
     ++found;
-    EXPECT_FALSE(faces_cross(a, b));
+    EXPECT_FALSE(faces_cross_exactly(a, b));
     for (int k = 0; k < 50; ++k) {
       ASSERT_LE(apart, glm::length(random_point(a, random) - random_point(b, random)) * (1 + 1e-12));
     }
@@ -64,7 +64,7 @@ TEST(FacesApart, WhatIsSaidToBeUncrossedIsUncrossed) {
     Corners a{corner(), corner(), corner()}, b{corner(), corner(), corner()};
     int shared = 0;
     for (const dvec3& p : a) shared += std::ranges::find(b, p) != b.end();
-    const bool cross = faces_cross(a, b), uncrossed = surely_uncrossed(a, b);
+    const bool cross = faces_cross_exactly(a, b), uncrossed = surely_uncrossed(a, b);
     ASSERT_FALSE(cross && uncrossed);
     ASSERT_EQ(uncrossed, surely_uncrossed(a, b));
     if (is_degenerate(a) || is_degenerate(b) || cross) continue;
@@ -193,7 +193,7 @@ TEST(FacesApart, WhatCrossesIsNeverSurelyUncrossedAtAnySize) {
       return Corners{size * start, size * (start + 2.0 * random.point()), size * (start + 0.2 * random.point())};
     };
     const Corners a = needle(), b = needle();
-    if (!faces_cross(a, b)) continue;
+    if (!faces_cross_exactly(a, b)) continue;
     ++crossing;
     ASSERT_FALSE(surely_uncrossed(a, b)) << size;
     ASSERT_EQ(gap(a, b, kFar), 0) << size;
@@ -212,7 +212,7 @@ TEST(FacesApart, TinyEdgesAreNotTakenForSureBesideHugeOnes) {
     const auto in_plane = [&] { return huge * (double(random.below(5) + 1) * v + (double(random.below(9)) - 4) * u); };
     const Corners a{dvec3(0), tiny * u, tiny * v};
     for (const Corners& b : {Corners{dvec3(0), tiny * u, in_plane()}, Corners{dvec3(0), in_plane(), in_plane()}}) {
-      if (!faces_cross(a, b)) continue;
+      if (!faces_cross_exactly(a, b)) continue;
       ++crossing;
       ASSERT_FALSE(surely_uncrossed(a, b) || surely_uncrossed(b, a)) << i;
     }

@@ -15,6 +15,7 @@ namespace {
 using glm::dvec3;
 using tolvol::Corners;
 using tolvol::faces_cross;
+using tolvol::faces_cross_exactly;
 using tolvol::is_degenerate;
 
 const Corners kFlat{dvec3(0, 0, 0), dvec3(4, 0, 0), dvec3(0, 4, 0)};
@@ -30,6 +31,7 @@ bool cross(Corners a, Corners b) {
     if (i % 18 == 0) std::swap(b[0], b[1]);
     EXPECT_EQ(faces_cross(a, b), answer);
     EXPECT_EQ(faces_cross(b, a), answer);
+    EXPECT_EQ(faces_cross_exactly(a, b), answer);
   }
   return answer;
 }
@@ -125,6 +127,7 @@ TEST(FacesCross, KeepsTheAnswerWhenMoved) {
     const bool answer = faces_cross(a, b);
     crossing += answer;
     EXPECT_EQ(faces_cross(b, a), answer);
+    EXPECT_EQ(faces_cross_exactly(a, b), answer);
     for (Corners* t : {&a, &b}) {
       for (dvec3& p : *t) p = 0x1p-20 * (p + dvec3(1e6, -3e5, 12345));
     }

@@ -32,28 +32,29 @@ class Points {
 };
 
 const glm::dvec3 kOrigins[] = {glm::dvec3(0), {1, -2, 3}, {1e9, -1e9, 1e-9}, {1e37, 1e39, -1e300}};
+const double kSizes[] = {1, 1e-30, 1e30, 0, 1e-300, 1e300};
 
 TEST(RoundedBox, BoxesThatMeetDoSoRounded) {
   for (const glm::dvec3& origin : kOrigins) {
-    const BoxRounding rounding(origin);
     Points points(origin);
     int met = 0;
-    for (int i = 0; i < 20'000; ++i) {
+    for (int i = 0; i < 60'000; ++i) {
+      const BoxRounding rounding(origin, kSizes[i % 6]);
       Box a, b;
       a.add(points()), b.add(points()), a.add(points()), b.add(points());
       if (!meet(a, b)) continue;
       ++met;
       ASSERT_TRUE(meet(rounding(a), rounding(b))) << i;
     }
-    EXPECT_GT(met, 1000);
+    EXPECT_GT(met, 3000);
   }
 }
 
 TEST(RoundedBox, TheBoxAroundARoundedOneHasTheBox) {
   for (const glm::dvec3& origin : kOrigins) {
-    const BoxRounding rounding(origin);
     Points points(origin);
-    for (int i = 0; i < 20'000; ++i) {
+    for (int i = 0; i < 60'000; ++i) {
+      const BoxRounding rounding(origin, kSizes[i % 6]);
       Box box;
       box.add(points()), box.add(points());
       const Box around = rounding.around(rounding(box));

@@ -8,9 +8,9 @@ import numpy as np
 from ..shared.errors import Refused
 from .cells import Box, Cells, centroids
 
-# What the work in a cell takes at its peak, in bytes: by itself, and for each triangle in the first round, where the mesh is
-# the reference, and in later rounds, where nearly all triangles are those of the reference (docs/benchmark.md).
-FIXED, OF_FIRST, OF_LATER = 160 << 20, 1650, 850
+# What the work in a cell takes at its peak, in bytes: by itself, and for each triangle of the reference, in the first round,
+# where the mesh is the reference, and in later rounds (docs/benchmark.md).
+FIXED, OF_FIRST, OF_LATER = 160 << 20, 1250, 1000
 # As much of this may be the grid of distances.
 OF_GRID = 100
 
