@@ -34,10 +34,10 @@ inline bool meet(const RoundedBox& a, const RoundedBox& b) {
 /// origin, by 2^-126 of `size`, and by 2^-50 of the origin's own distance from 0.
 class BoxRounding {
  public:
-  /// Most coordinates should lie around the origin, at distances about or below `size`, which is not negative.
+  /// Most coordinates should lie around the origin, at distances about or below `size`, which is not negative. Without
+  /// arguments a rounded box has the coordinates as they are, but for the rounding.
   explicit BoxRounding(const glm::dvec3& origin = glm::dvec3(0), double size = 1) : origin_(origin) {
-    int exponent = 0;
-    std::frexp(std::clamp(size, 0x1p-900, 0x1p900), &exponent);
+    const int exponent = std::ilogb(std::clamp(size, 0x1p-900, 0x1p900));
     scale_ = std::ldexp(1.0, -exponent), unscale_ = std::ldexp(1.0, exponent);
     const glm::dvec3 slack = 4 * std::numeric_limits<double>::epsilon() * glm::abs(origin);
     below_ = origin - slack, above_ = origin + slack;

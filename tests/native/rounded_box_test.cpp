@@ -66,6 +66,12 @@ TEST(RoundedBox, TheBoxAroundARoundedOneHasTheBox) {
   }
 }
 
+TEST(RoundedBox, WithoutAnOriginItHasTheCoordinatesAsTheyAre) {
+  const RoundedBox rounded = BoxRounding()({glm::dvec3(-0.25, 0, 1), glm::dvec3(0.5, 3, 1)});
+  EXPECT_LT(glm::length(rounded.lower - glm::vec3(-0.25, 0, 1)), 1e-6);
+  EXPECT_LT(glm::length(rounded.upper - glm::vec3(0.5, 3, 1)), 1e-6);
+}
+
 TEST(RoundedBox, ABoxGrowsByAMillionthOfItsDistance) {
   const BoxRounding rounding(glm::dvec3(1e6));
   Random random(3);
