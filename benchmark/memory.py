@@ -100,7 +100,9 @@ def main():
             words = [sys.executable, __file__, "--one", "--triangles", str(millions), "--tolerance", str(percent)]
             found = json.loads(subprocess.run(words, check=True, capture_output=True, text=True).stdout)
             times = [f"{found[name]:.1f}" for name in ("volume", "decimation")]
-            rows.append([f"{found['triangles']:,}", f"{percent:g}", *times, f"{found['bytes']:.0f}", f"{found['left']:,}"])
+            rows.append(
+                [f"{found['triangles']:,}", f"{percent:g}", *times, f"{found['bytes']:.0f}", f"{found['left']:,}"]
+            )
             print(*rows[-1], sep=" | ", flush=True)
     text = f"{machine()}.\n\n{tables.table(HEADS, rows, 'rrrrrr')}"
     print(text)
