@@ -74,12 +74,10 @@ FacingRule::FacingRule(const TriangleMesh& reference, double reference_error, do
 }
 
 void FacingRule::bound_normals(const Hierarchy& hierarchy) {
-  const BoxRounding rounded;
   below_.assign(hierarchy.node_count(), {});
   hierarchy.for_each_below(
       [&](std::uint32_t node, std::uint32_t triangle) {
-        const glm::dvec3& normal = normals[triangle];
-        if (!std::isnan(normal.x)) below_[node].add(rounded({normal, normal}));
+        if (!std::isnan(normals[triangle].x)) below_[node].add(normals[triangle]);
       },
       [&](std::uint32_t node, std::uint32_t child) { below_[node].add(below_[child]); });
 }

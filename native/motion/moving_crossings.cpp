@@ -14,8 +14,8 @@ namespace {
 
 /// The number of faces that a thread takes at a time, for work of about 1 us each.
 constexpr std::size_t kFacesAtOnce = 64;
-/// Once a face is known to cross another anew, it is compared with this many more whose boxes meet its own, or nearly:
-/// where very many faces meet, all of them have to go back anyway.
+/// Once a face is known to cross another anew, it is compared with this many more whose boxes meet its own: where very
+/// many faces meet, all of them have to go back anyway.
 constexpr std::size_t kFurther = 64;
 /// The trees of faces are built anew when their boxes have become more than this many times as large.
 constexpr double kWorn = 2;

@@ -53,8 +53,8 @@ class MovingFaces {
   /// FaceTree::extent() of all.
   double extent() const;
 
-  /// Calls visit(other) for all faces that the face may cross, and for itself: for all whose boxes meet its own, or
-  /// nearly, except for some that share a hub with it and do not cross it. A visit that returns false ends the search.
+  /// Calls visit(other) for all faces that the face may cross, and for itself: for all whose boxes meet its own, except
+  /// for some that share a hub with it and do not cross it. A visit that returns false ends the search.
   template <class At, class Visit>
   void for_each_near(std::uint32_t face, At&& at, Visit&& visit) const {
     const auto none = [](const glm::dvec3&) { return [](const Box&) { return false; }; };

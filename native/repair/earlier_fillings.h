@@ -30,8 +30,8 @@ class EarlierFillings {
 
   /// Whether an edge (FillingRules::edge_of()) is one of those that were kept.
   bool has_edge(std::uint64_t edge) const { return edges_.contains(edge); }
-  /// Calls visit(corners) for the faces of lower holes whose boxes meet `box`, or nearly. A visit that returns false is
-  /// the last one.
+  /// Calls visit(corners) for the faces of lower holes whose boxes meet `box`. A visit that returns false is the last
+  /// one.
   template <class Visit>
   void for_each_near(const Hole& hole, const Box& box, Visit&& visit) const {
     tree_.for_each_meeting(box,

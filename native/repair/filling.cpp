@@ -152,8 +152,7 @@ bool Filling::prove_guess() {
 }
 
 /// Calls visit(corners) for all faces of the input, and of the fillings that the hole has to keep apart from, that a
-/// triangle crosses, and for some others whose boxes meet its box, or nearly. A visit that returns false is the last
-/// one.
+/// triangle crosses, and for some others whose boxes meet its box. A visit that returns false is the last one.
 template <class Visit>
 void Filling::for_each_near(const Corners& stored, Visit&& visit) const {
   bool more = true;

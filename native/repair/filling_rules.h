@@ -75,7 +75,7 @@ class FillingRules {
     return pair_key(place_[hole.corner[i]], place_[hole.corner[j]]);
   }
   /// Calls visit(corners) for all faces of the mesh that a triangle crosses, and for some others whose boxes meet its
-  /// box, or nearly. A visit that returns false is the last one.
+  /// box. A visit that returns false is the last one.
   template <class Visit>
   void for_each_near(const Corners& stored, Visit&& visit) const {
     std::size_t met = 0;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 
 namespace tolvol {
 namespace {
@@ -13,23 +12,7 @@ constexpr std::size_t kMany = 8;
 /// A leaf has at most this many faces. Fewer would take more nodes, and no less time.
 constexpr std::size_t kLeaf = 8;
 
-/// The place around which most faces lie is that of so many.
-constexpr std::size_t kSome = 1024;
-
-/// Returns a point around which most of some points lie, however far away the others are. Points that are not finite
-/// count as far away.
-glm::dvec3 median(std::vector<glm::dvec3>& points) {
-  glm::dvec3 middle(0);
-  std::erase_if(points, [](const glm::dvec3& p) { return !std::isfinite(p.x + p.y + p.z); });
-  if (points.empty()) return middle;
-  const auto half = points.begin() + static_cast<std::ptrdiff_t>(points.size() / 2);
-  for (int k = 0; k < 3; ++k) {
-    std::nth_element(points.begin(), half, points.end(),
-                     [k](const glm::dvec3& a, const glm::dvec3& b) { return a[k] < b[k]; });
-    middle[k] = (*half)[k];
-  }
-  return middle;
-}
+bool same(const Box& a, const Box& b) { return a.lower == b.lower && a.upper == b.upper; }
 
 }  // namespace
 
@@ -42,18 +25,10 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, const std::function<Box
     std::uint32_t index;  // among the faces
   };
   std::vector<Entry> entries(faces.size());
-  Box all;
   for (std::uint32_t i = 0; i < entries.size(); ++i) {
     poll_at(i);
     const Box of_face = box(i);
     entries[i] = {0.5 * of_face.lower + 0.5 * of_face.upper, i};
-    all.add(of_face);
-  }
-  if (!all.empty()) {
-    std::vector<glm::dvec3> some;
-    for (std::size_t i = 0; i < entries.size(); i += 1 + entries.size() / kSome) some.push_back(entries[i].centre);
-    const glm::dvec3 size = all.upper - all.lower;
-    rounding_ = BoxRounding(median(some), std::max({size.x, size.y, size.z}));
   }
   leaves_ = std::bit_ceil((entries.size() + kLeaf - 1) / kLeaf);
   slots_of_leaf_ = (entries.size() + leaves_ - 1) / leaves_;
@@ -79,14 +54,14 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, const std::function<Box
     next.back() = entries.size();
     border.swap(next);
   }
-  fill(boxes_, leaves_ * slots_of_leaf_, RoundedBox());
+  fill(boxes_, leaves_ * slots_of_leaf_, Box());
   fill(numbers_, boxes_.size(), 0u);
-  fill(nodes_, 2 * leaves_ - 1, RoundedBox());
+  fill(nodes_, 2 * leaves_ - 1, Box());
   for (std::size_t leaf = 0; leaf < leaves_; ++leaf) {
     poll_at(leaf);
     for (std::size_t i = border[leaf], slot = leaf * slots_of_leaf_; i < border[leaf + 1]; ++i, ++slot) {
       const std::uint32_t index = entries[i].index;
-      boxes_[slot] = rounding_(box(index)), numbers_[slot] = faces[index];
+      boxes_[slot] = box(index), numbers_[slot] = faces[index];
       place_[index] = static_cast<std::uint32_t>(slot);
     }
     fit_leaf(leaf);
@@ -98,13 +73,13 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, const std::function<Box
 }
 
 void FaceTree::fit_leaf(std::size_t leaf) {
-  RoundedBox& box = nodes_[leaves_ - 1 + leaf];
+  Box& box = nodes_[leaves_ - 1 + leaf];
   box = {};
   for (std::size_t i = leaf * slots_of_leaf_; i < (leaf + 1) * slots_of_leaf_; ++i) box.add(boxes_[i]);
 }
 
-RoundedBox FaceTree::fitted(std::size_t node) const {
-  RoundedBox box = nodes_[2 * node + 1];
+Box FaceTree::fitted(std::size_t node) const {
+  Box box = nodes_[2 * node + 1];
   box.add(nodes_[2 * node + 2]);
   return box;
 }
@@ -120,7 +95,7 @@ void FaceTree::change(std::span<const std::uint32_t> faces, std::span<const Box>
     for (std::size_t i = 0; i < faces.size(); ++i) change(faces[i], boxes[i]);
     return;
   }
-  for (std::size_t i = 0; i < faces.size(); ++i) boxes_[slot_of(faces[i])] = rounding_(boxes[i]);
+  for (std::size_t i = 0; i < faces.size(); ++i) boxes_[slot_of(faces[i])] = boxes[i];
   for (std::size_t leaf = 0; leaf < leaves_; ++leaf) fit_leaf(leaf);
   for (std::size_t node = leaves_ - 1; node-- > 0;) nodes_[node] = fitted(node);
 }
@@ -128,7 +103,7 @@ void FaceTree::change(std::span<const std::uint32_t> faces, std::span<const Box>
 double FaceTree::extent() const {
   double sum = 0;
   for (std::size_t leaf = 0; leaf < leaves_; ++leaf) {
-    const Box box = rounding_.around(nodes_[leaves_ - 1 + leaf]);
+    const Box& box = nodes_[leaves_ - 1 + leaf];
     if (box.empty()) continue;
     const glm::dvec3 size = box.upper - box.lower;
     sum += size.x + size.y + size.z;
@@ -138,12 +113,12 @@ double FaceTree::extent() const {
 
 void FaceTree::change(std::uint32_t face, const Box& box) {
   const std::size_t slot = slot_of(face), leaf = slot / slots_of_leaf_;
-  boxes_[slot] = rounding_(box);
+  boxes_[slot] = box;
   fit_leaf(leaf);
   for (std::size_t node = leaves_ - 1 + leaf; node > 0;) {
     node = (node - 1) / 2;
-    const RoundedBox box_of_both = fitted(node);
-    if (box_of_both == nodes_[node]) return;
+    const Box box_of_both = fitted(node);
+    if (same(box_of_both, nodes_[node])) return;
     nodes_[node] = box_of_both;
   }
 }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The boxes of a mesh's faces, to find the faces near a place while faces change and vanish. They are kept in float32,
-/// which takes half the memory.
+/// The boxes of a mesh's faces, to find the faces near a place while faces change and vanish.
 #pragma once
 
 #include <array>
@@ -11,19 +10,17 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "geometry/rounded_box.h"
 #include "geometry/triangle_mesh.h"
 
 namespace tolvol {
 
-/// A balanced tree of boxes, cut at medians. Several threads may search it at once while none changes it. The order of
-/// the faces that a search finds, and which it finds beside those that it has to find, depends on the boxes that the
-/// tree was built with.
+/// A balanced tree of boxes, cut at medians. Several threads may search it at once while none changes it. Which faces a
+/// search finds depends on the boxes alone; their order also depends on the boxes that the tree was built with.
 class FaceTree {
  public:
   FaceTree() = default;
   /// `faces` are the numbers of the faces, in rising order, and `boxes` their boxes. O(n log n), about 0.2 us a
-  /// face, 40 to 55 bytes, and 32 bytes more while it is built.
+  /// face, 70 to 100 bytes, and 32 bytes more while it is built.
   FaceTree(std::span<const std::uint32_t> faces, std::span<const Box> boxes, Team& team)
       : FaceTree(
             faces, [boxes](std::size_t i) { return boxes[i]; }, team) {}
@@ -37,44 +34,39 @@ class FaceTree {
   void change(std::span<const std::uint32_t> faces, std::span<const Box> boxes);
 
   /// A box around all faces, which is empty if there are none.
-  Box box() const { return nodes_.empty() ? Box() : rounding_.around(nodes_.front()); }
+  Box box() const { return nodes_.empty() ? Box() : nodes_.front(); }
 
   /// The sum of the sizes of the leaves' boxes along the axes: the larger it has become since the tree was built, the
   /// more a search has to look at.
   double extent() const;
 
-  /// Calls visit(face) for every face whose box meets `box`, and for a few whose box is so near that float32 does not
-  /// tell. A visit that returns false ends the search.
+  /// Calls visit(face) for every face whose box meets `box`, and for no other. A visit that returns false ends the
+  /// search.
   template <class Visit>
   void for_each_meeting(const Box& box, Visit&& visit) const {
-    search([rounded = rounding_(box)](const RoundedBox& of_faces) { return meet(of_faces, rounded); }, visit);
+    for_each_where([&](const Box& of_faces) { return meet(of_faces, box); }, visit);
   }
-  /// The same for every face for whose box `may` holds, and for a few more. It has to hold of every box around such a
-  /// box, too, and of no empty one.
+  /// The same for every face for whose box `may` holds. It has to hold of every box around such a box, too, and of no
+  /// empty one.
   template <class May, class Visit>
-  void for_each_where(May&& may, Visit&& visit) const {
-    search([&](const RoundedBox& of_faces) { return may(rounding_.around(of_faces)); }, visit);
-  }
+  void for_each_where(May&& may, Visit&& visit) const;
 
  private:
   std::size_t slot_of(std::uint32_t face) const;
   void fit_leaf(std::size_t leaf);
-  RoundedBox fitted(std::size_t node) const;
-  template <class May, class Visit>
-  void search(May&& may, Visit&& visit) const;
+  Box fitted(std::size_t node) const;
 
-  BoxRounding rounding_;                ///< from where most faces were when the tree was built
   std::size_t leaves_ = 0;              ///< a power of two, or 0 without faces
-  std::vector<RoundedBox> nodes_;       ///< the root first; the children of node i are 2 i + 1 and 2 i + 2; leaves last
+  std::vector<Box> nodes_;              ///< the root first; the children of node i are 2 i + 1 and 2 i + 2; leaves last
   std::size_t slots_of_leaf_ = 0;       ///< the number of slots of each leaf: the most faces in one
-  std::vector<RoundedBox> boxes_;       ///< per slot; empty where the leaf has fewer faces
+  std::vector<Box> boxes_;              ///< per slot; empty where the leaf has fewer faces
   std::vector<std::uint32_t> numbers_;  ///< per slot: its face
   std::vector<std::uint32_t> faces_;    ///< in rising order; empty if the numbers are 0, 1, 2 and so on
-  std::vector<std::uint32_t> place_;    ///< per face of faces_: its slot
+  std::vector<std::uint32_t> place_;    ///< per face, in that order: its slot
 };
 
 template <class May, class Visit>
-void FaceTree::search(May&& may, Visit&& visit) const {
+void FaceTree::for_each_where(May&& may, Visit&& visit) const {
   if (leaves_ == 0) return;
   std::array<std::uint32_t, 66> stack;  // at most one node a level waits beside the next: 32 levels
   std::size_t height = 0;

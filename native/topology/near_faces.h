@@ -53,9 +53,10 @@ class NearFaces {
   void change(std::uint32_t face, const Corners& corners);
   void remove(std::uint32_t face);
 
-  /// Calls visit(face) for all faces that one of `own` crosses, and for some others whose boxes meet, or nearly. `all`
-  /// is a box around `own`, whose elements have a member `corners`. A visit that returns false ends the search. The
-  /// order of the faces, and which others are among them, depends on those that the trees were built with.
+  /// Calls visit(face) for all faces that one of `own` crosses, and for some others whose boxes meet. `all` is a box
+  /// around `own`, whose elements have a member `corners`. A visit that returns false ends the search. Which faces a
+  /// search finds depends on `own` and the faces alone; their order also depends on those that the trees were built
+  /// with.
   template <class Faces, class Visit>
   void for_each_near(const Box& all, const Faces& own, Visit&& visit) const;
   /// The same near one face.

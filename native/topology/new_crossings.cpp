@@ -153,8 +153,7 @@ std::vector<std::uint32_t> NewCrossings::others_near(const NearFaces& near, std:
   for (const Box& box : trial.boxes_) all.add(box);
   std::vector<std::uint32_t> found;
   near.for_each_near(all, faces, [&](std::uint32_t face) {
-    const bool stays = !std::ranges::binary_search(trial.replaced_, face);
-    if (stays && meet(all, box_of(corners(face)))) found.push_back(face);
+    if (!std::ranges::binary_search(trial.replaced_, face)) found.push_back(face);
     return true;
   });
   std::ranges::sort(found);

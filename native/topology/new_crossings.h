@@ -73,8 +73,8 @@ class NewCrossings {
   bool none(const NearFaces& near, std::span<const Face> faces, std::span<const Removed> removed, Trial& trial) const;
 
   /// The faces that those of a change may cross, which none() was asked about last with this trial, and that stay as
-  /// they are. All meet the box that the trial read. They are in rising order: that of a search depends on which
-  /// corners counted as hubs when the tree was built, and no result may depend on that.
+  /// they are. They are in rising order: that of a search depends on which corners counted as hubs when the tree was
+  /// built, and no result may depend on that.
   std::vector<std::uint32_t> others_near(const NearFaces& near, std::span<const Face> faces, const Trial& trial) const;
 
   /// The same of changes that were carried out on trust: whether none of the `changed` faces, as they are now, is

@@ -136,7 +136,7 @@ def test_the_panel_states_what_became_of_a_decimated_solid():
     assert last_run.facts(compared, bpy.context) == "2 boundary loops, 3 shells (+2), area 0.25\xa0mm²"
     assert ", volume 1e+300" in last_run.facts(compared | {"after": holed | {"volume": 1e300}}, bpy.context)
     assert ", volume 717,274\xa0cm³" in last_run.facts(compared | {"after": holed | {"volume": 717_274e3}}, bpy.context)
-    assert ", volume -0.25\xa0cm³" in last_run.facts(compared | {"after": holed | {"volume": -250.0}}, bpy.context)
+    assert ", volume -0.25\xa0mm³" in last_run.facts(compared | {"after": holed | {"volume": -0.25}}, bpy.context)
     assert ", volume 0.5\xa0mm³" in last_run.facts(compared | {"after": holed | {"volume": 0.5}}, bpy.context)
 
 
