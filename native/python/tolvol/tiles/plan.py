@@ -10,7 +10,7 @@ from .cells import Box, Cells, centroids
 
 # What the work in a cell takes at its peak, in bytes: by itself, and for each triangle of the reference, in the first round,
 # where the mesh is the reference, and in later rounds (docs/benchmark.md).
-FIXED, OF_FIRST, OF_LATER = 160 << 20, 1250, 1000
+FIXED, OF_FIRST, OF_LATER = 160 << 20, 1650, 850
 # As much of this may be the grid of distances.
 OF_GRID = 100
 
