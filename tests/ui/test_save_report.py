@@ -109,3 +109,21 @@ def test_format_is_chosen_in_the_file_browser():
         saved = folder / "torus deviation.csv"
         yield from finished(saved.is_file)
         assert saved.read_text().startswith("direction,quantity")
+
+
+def test_a_page_of_several_objects_is_not_named_after_one():
+    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
+    yield from torus_with_reference()
+    torus = bpy.context.active_object
+    bpy.ops.mesh.primitive_cube_add()
+    torus.select_set(True)
+    bpy.context.view_layer.objects.active = torus
+    with folder_to_save_in():
+        yield from press("tolvol.save_report", across=0.7)
+        yield from at_rest()
+        area, _ = browser()
+        assert area.spaces[0].params.filename == "objects deviation.html"
+        xdotool("mousemove", 640, 400)
+        yield
+        key("Escape")
+        yield from at_rest()
