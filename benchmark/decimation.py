@@ -10,7 +10,6 @@ input, 3 if any result is not proved.
 """
 
 import json
-import re
 import sys
 import time
 from pathlib import Path
@@ -26,6 +25,7 @@ import table1  # noqa: E402
 import tables  # noqa: E402
 from addon.native import module as tolvol  # noqa: E402
 from machine import machine  # noqa: E402
+from peak_memory import PeakMemory  # noqa: E402
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "build" / "release" / "python"))
 
@@ -45,19 +45,6 @@ class Stopwatch:
         elapsed = time.perf_counter() - started
         self.seconds[name] = min(elapsed, self.seconds.get(name, elapsed))
         return result
-
-
-class PeakMemory:
-    """Measures the most memory that the process has held since the object was made, in bytes (Linux only)."""
-
-    def __init__(self):
-        Path("/proc/self/clear_refs").write_text("5")
-        self.before = self.peak()
-
-    @staticmethod
-    def peak():
-        status = Path("/proc/self/status").read_text()
-        return 1024 * int(re.search(r"VmHWM:\s+(\d+) kB", status)[1])
 
 
 def measure(name, vertices, triangles, options):

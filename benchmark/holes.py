@@ -99,10 +99,7 @@ def main():
         measured("bumpy sphere, a fifth of the faces missing", *bumpy_sphere(0.2)),
         measured("bumpy sphere, half of the faces missing", *bumpy_sphere(0.5)),
     ]
-    text = tables.table(HEADS, rows, "l" + "r" * (len(HEADS) - 1))
-    print(text)
-    if options.write:
-        tables.write(options.write, "closing holes", text)
+    tables.publish(options.write, "closing holes", tables.table(HEADS, rows, "l" + "r" * (len(HEADS) - 1)))
 
 
 main()

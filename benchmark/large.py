@@ -96,10 +96,7 @@ def main():
                     row = run(source, Path(folder), tolerance, extra)
                     rows.append([f"{count:,}", tolerance, memory or "whole", *row])
                     print(*rows[-1], sep=" | ", flush=True)
-    text = f"{machine()}.\n\n{tables.table(HEADS, rows, 'rllrrrrll')}"
-    print(text)
-    if options.write:
-        tables.write(options.write, "large meshes", text)
+    tables.publish(options.write, "large meshes", f"{machine()}.\n\n{tables.table(HEADS, rows, 'rllrrrrll')}")
 
 
 if __name__ == "__main__":

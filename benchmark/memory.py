@@ -11,10 +11,8 @@ for the first time: the times are of the second run, and the memory is the peak 
 import argparse
 import json
 import os
-import resource
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -28,6 +26,7 @@ import tolvol  # noqa: E402
 import meshes  # noqa: E402
 import tables  # noqa: E402
 from machine import machine  # noqa: E402
+from peak_memory import PeakMemory  # noqa: E402
 
 MILLION = 1_000_000
 # The share of a torus's radius by which noise moves its vertices.
@@ -35,51 +34,26 @@ NOISE = 1e-5
 HEADS = ["Triangles", "Tolerance, %", "Volume, s", "Decimation, s", "Peak, bytes a triangle", "Left"]
 
 
-def held():
-    """Returns the number of bytes that this process holds in memory."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
-
-
-class Peak:
-    """Sees how many bytes this process holds at most within its scope. The peak that the system reports counts from the start
-    of the process."""
-
-    def __enter__(self):
-        self.bytes, self._ended = held(), threading.Event()
-        self._thread = threading.Thread(target=self._watch)
-        self._thread.start()
-        return self
-
-    def _watch(self):
-        while not self._ended.wait(0.005):
-            self.bytes = max(self.bytes, held())
-
-    def __exit__(self, *_):
-        self._ended.set()
-        self._thread.join()
-
-
 def measure(count, percent):
     """Returns what is known of the decimation of a torus of about `count` triangles."""
     columns = round((1.25 * count) ** 0.5)
     vertices, triangles = meshes.torus(columns, round(count / 2 / columns), noise=NOISE)
     vertices = vertices.astype(np.float32)
-    before = held()
     tolerance = percent / 100 * tolvol.diagonal(vertices, triangles)
-    with Peak() as peak:
-        for _ in range(2):
-            began = time.perf_counter()
-            volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
-            built = time.perf_counter()
-            result = tolvol.decimate(vertices, triangles, volume)
-            ended = time.perf_counter()
-            left = len(result.triangles)
-            del volume, result
+    memory = PeakMemory()
+    for _ in range(2):
+        began = time.perf_counter()
+        volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
+        built = time.perf_counter()
+        result = tolvol.decimate(vertices, triangles, volume)
+        ended = time.perf_counter()
+        left = len(result.triangles)
+        del volume, result
     return {
         "triangles": len(triangles),
         "volume": built - began,
         "decimation": ended - built,
-        "bytes": (peak.bytes - before) / len(triangles),
+        "bytes": (memory.peak() - memory.before) / len(triangles),
         "left": left,
     }
 
@@ -104,10 +78,7 @@ def main():
                 [f"{found['triangles']:,}", f"{percent:g}", *times, f"{found['bytes']:.0f}", f"{found['left']:,}"]
             )
             print(*rows[-1], sep=" | ", flush=True)
-    text = f"{machine()}.\n\n{tables.table(HEADS, rows, 'rrrrrr')}"
-    print(text)
-    if options.write:
-        tables.write(options.write, "memory", text)
+    tables.publish(options.write, "memory", f"{machine()}.\n\n{tables.table(HEADS, rows, 'rrrrrr')}")
 
 
 if __name__ == "__main__":

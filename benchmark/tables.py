@@ -21,3 +21,10 @@ def write(path, name, text):
     if not found:
         before, after = page + ("\n" if page else ""), "\n"
     path.write_text(f"{before}{begin}\n{text}\n{end}{after}")
+
+
+def publish(path, name, text):
+    """Prints `text`, and puts it into the file at `path` unless that is None."""
+    print(text)
+    if path:
+        write(path, name, text)

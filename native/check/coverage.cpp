@@ -123,7 +123,7 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
       assign(common.triangle, common.distance);
       continue;
     }
-    const glm::dvec3 centre = (c[0] + c[1] + c[2]) * (1.0 / 3);
+    const auto [centre, radius] = sphere_around({c[0], c[1], c[2]});
     const Hierarchy::Nearest closest = hierarchy.nearest(centre, std::numeric_limits<double>::infinity(), hint);
     const glm::uvec3& t = mesh.triangles[closest.triangle];
     const WitnessTriangle below{mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]};
@@ -134,9 +134,6 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
       assign(closest.triangle, distance);
       continue;
     }
-    const double radius =
-        std::sqrt(std::max({glm::dot(c[0] - centre, c[0] - centre), glm::dot(c[1] - centre, c[1] - centre),
-                            glm::dot(c[2] - centre, c[2] - centre)}));
     found_beyond = found_beyond || closest.distance > provable;
     const std::size_t parts = found_beyond ? 1 + (common.nodes + closest.nodes) / kNodesOfPart : 1;
     const double floor = (found_beyond ? kShortestPiece : kHeadroom) * limit_;

@@ -159,8 +159,8 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   for (const std::uint32_t i : cut_.vertex_input) used.push_back(vertices_[i]);
   if (const auto warning = storage_warning(*volume_, space_, used)) report_.warnings.push_back(*warning);
   // Vertices may end up anywhere in the volume.
-  const double mapping_error = mapping_error_ = space_.mapping_error(used, 1 + volume_->frame_tolerance());
-  const double provable = volume_->provable(mapping_error), limit = provable * (1 - kHeadroom);
+  mapping_error_ = space_.mapping_error(used, 1 + volume_->frame_tolerance());
+  const double provable = volume_->provable(mapping_error_), limit = provable * (1 - kHeadroom);
   if (options_.baseline) {
     options_.baseline->begin({positions_, cut_.triangles}, space_);
     report_.method = options_.baseline->method(), report_.renderer = options_.baseline->renderer();
@@ -173,7 +173,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
     for (std::uint32_t t = 0; t < cut_.triangle_input.size(); ++t) element_of_[cut_.triangle_input[t]] = t;
   }
   forward_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), limit,
-                   volume_->refutable(mapping_error));
+                   volume_->refutable(mapping_error_));
   CertifiedBounds::Directions directions{*forward_};
   if (options_.two_sided) {
     backward_.emplace(volume_->reference(), limit, cut_.triangles.size());
@@ -187,7 +187,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
       directions.boundary_backward = &boundary_->backward();
     }
   }
-  facing_ = facing_rule(*volume_, mapping_error, options_.max_normal_angle, report_.warnings);
+  facing_ = facing_rule(*volume_, mapping_error_, options_.max_normal_angle, report_.warnings);
   if (facing_) {
     if (own_count_ > 0) face_as_cut(cut_, volume_->hierarchy(), *facing_);
     directions.facing = &*facing_;
@@ -200,7 +200,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   certified_.emplace(directions, MeshView{cut_.triangles, positions_}, on_reference);
   // What is proved to face the reference is within the tolerance, and is not proved again.
   std::vector<std::uint8_t> proved;
-  if (facing_ && own_count_ < triangles_.size()) proved = face(provable, mapping_error, team);
+  if (facing_ && own_count_ < triangles_.size()) proved = face(provable, team);
   certify_input(certificate, proved);
   // A face that is outside has no witness, and so no angle. It is counted as outside.
   std::erase_if(exceeding_, [&](std::uint32_t t) { return exempt_[cut_.triangle_input[t]]; });
@@ -221,9 +221,9 @@ void DecimationInput::pin_boundary() {
 
 /// Finds how the triangles that are none of the reference face it. Returns for each triangle of the manifold whether it
 /// is proved to be within the tolerance.
-std::vector<std::uint8_t> DecimationInput::face(double provable, double mapping_error, Team& team) {
+std::vector<std::uint8_t> DecimationInput::face(double provable, Team& team) {
   const TriangleCertificate start(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), provable,
-                                  volume_->refutable(mapping_error));
+                                  volume_->refutable(mapping_error_));
   Progress* const progress = options_.progress;
   if (progress) progress->begin("checking");
   InputFacing found;
@@ -307,9 +307,7 @@ void DecimationInput::hold_near(std::span<const Part> pieces, const TriangleMesh
   const Hierarchy hierarchy(elements);
   for (const Part& piece : pieces) {
     poll();
-    const auto& [a, b, c] = piece.corners;
-    const glm::dvec3 centre = (a + b + c) * (1.0 / 3);
-    const double radius = std::max({glm::distance(a, centre), glm::distance(b, centre), glm::distance(c, centre)});
+    const auto [centre, radius] = sphere_around({piece.corners[0], piece.corners[1], piece.corners[2]});
     hierarchy.for_each_within(centre, (provable + radius) * (1 + kHeadroom), [&](std::uint32_t near) {
       for (int k = 0; k < 3; ++k) pin(elements.triangles[near][k], "beside an uncovered part of the reference");
     });

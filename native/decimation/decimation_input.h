@@ -112,7 +112,7 @@ class DecimationInput {
   void certify_input(const Certificate& certificate, std::span<const std::uint8_t> proved);
   void cover(double provable);
   void cover_divided(double provable);
-  std::vector<std::uint8_t> face(double provable, double mapping_error, Team& team);
+  std::vector<std::uint8_t> face(double provable, Team& team);
   void pin_boundary();
 
   std::span<const glm::dvec3> vertices_;

@@ -32,9 +32,8 @@ InputCrossings::FindNear near_input_faces(const DecimationInput& input) {
     const auto count = static_cast<std::uint32_t>(cut.triangles.size());
     const std::uint32_t of_reference = face < count ? cut.triangle_input[face] : cut.aside[face - count];
     const TriangleMesh& reference = volume->reference();
-    const auto [a, b, c] = MeshView{reference.triangles, reference.vertices}.corners(of_reference);
-    const glm::dvec3 centre = (a + b + c) * (1.0 / 3);
-    const double radius = std::max({glm::distance(a, centre), glm::distance(b, centre), glm::distance(c, centre)});
+    const MeshView faces{reference.triangles, reference.vertices};
+    const auto [centre, radius] = sphere_around(faces.corners(of_reference));
     std::size_t seen = 0;
     const auto visit_triangle = [&](std::uint32_t triangle) {
       poll_at(++seen);

@@ -2,6 +2,7 @@
 /// A triangle mesh as plain arrays, and the conditions that must hold before anything is computed from one.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -28,6 +29,17 @@ struct MeshView {
     return {vertices[t.x], vertices[t.y], vertices[t.z]};
   }
 };
+
+struct Sphere {
+  glm::dvec3 centre;
+  double radius;
+};
+
+/// The smallest sphere around the centroid of a triangle that has its corners.
+inline Sphere sphere_around(const Corners& t) {
+  const glm::dvec3 centre = (t[0] + t[1] + t[2]) * (1.0 / 3);
+  return {centre, std::max({glm::distance(t[0], centre), glm::distance(t[1], centre), glm::distance(t[2], centre)})};
+}
 
 /// An axis-aligned box. It is empty until a point is added.
 struct Box {

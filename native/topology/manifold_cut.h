@@ -31,9 +31,8 @@ struct CutMesh {
   std::vector<std::uint32_t> copies_of;     ///< is equal for copies: one of them. A vertex without copies has its own
   std::vector<std::uint32_t> output_slot;   ///< is equal for vertices, copies all, that are one vertex of the input
   std::vector<std::uint32_t> input_vertex;  ///< is the manifold vertex of each input vertex, kNone if it is not used
-  std::vector<std::uint32_t>
-      aside;  ///< are input triangles that no manifold holds, in rising order; they are kept as they are
-  std::vector<std::uint32_t> stand_in;  ///< is for each input triangle the one that holds its points, mostly itself
+  std::vector<std::uint32_t> aside;         ///< are input triangles, in rising order, that no manifold holds; they stay
+  std::vector<std::uint32_t> stand_in;      ///< is for each input triangle the one that holds its points, mostly itself
   // These members count the repairs.
   std::size_t duplicates = 0;  ///< counts dropped triangles on the vertices, or the positions in turn, of another
   std::size_t degenerate_on_edge = 0;  ///< counts degenerate triangles on another's edge, which are dropped

@@ -64,7 +64,7 @@ TriangleMesh tangle(unsigned count) {
   return mesh;
 }
 
-/// Pairs of triangles of which one touches the other in its farthest corner alone, as it lies beside it there.
+/// Pairs of triangles. The corner of one that is farthest from its centre lies on an edge of the other.
 TriangleMesh touching(unsigned count) {
   shapes::Random random(6);
   TriangleMesh mesh;
