@@ -95,7 +95,7 @@ InvalidInput
     If the mesh is not valid.
 Cancelled
 
-The predicates are CGAL's, and no epsilon is involved. The call takes about 2 us for each triangle on one thread, and
+The predicates are CGAL's, and no epsilon is involved. The call takes about 1.3 us for each triangle on one thread, and
 more where boxes of many triangles overlap.)doc");
   module.def("solidity", &solidity_facts, py::arg("vertices"), py::arg("triangles"), py::kw_only(),
              py::arg("to_world") = py::none(), py::arg("threads") = py::none(), py::arg("progress") = py::none(),

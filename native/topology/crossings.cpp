@@ -11,19 +11,13 @@
 namespace tolvol {
 namespace {
 
-/// Appends the pairs of face `i` and a higher one, in order.
-void append_pairs(std::uint32_t i, const MeshView& mesh, const NearFaces& near, std::vector<glm::uvec2>& pairs) {
-  const auto before = static_cast<std::ptrdiff_t>(pairs.size());
-  const Corners own = mesh.corners(i);
+/// Appends the pairs that cross of a group of faces.
+void append_pairs(std::size_t group, const MeshView& mesh, const NearFaces& near, std::vector<glm::uvec2>& pairs) {
   std::size_t seen = 0;
-  near.for_each_near(own, [&](std::uint32_t j) {
+  near.for_each_pair(group, [&](std::uint32_t a, std::uint32_t b) {
     if (seen++ % 256 == 0) poll();
-    if (j <= i) return true;
-    const Corners other = mesh.corners(j);
-    if (faces_cross(own, other)) pairs.emplace_back(i, j);
-    return true;
+    if (faces_cross(mesh.corners(a), mesh.corners(b))) pairs.emplace_back(std::min(a, b), std::max(a, b));
   });
-  std::sort(pairs.begin() + before, pairs.end(), [](const glm::uvec2& a, const glm::uvec2& b) { return a.y < b.y; });
 }
 
 }  // namespace
@@ -37,28 +31,30 @@ Crossings crossings(std::span<const glm::dvec3> vertices, std::span<const glm::u
       faces, [&](std::size_t i) { return mesh.corners(i); }, NearFaces::hubs_of(triangles, vertices.size()), team);
   if (progress) progress->begin("finding crossings");
   Crossings found;
-  // One face may cross all others: few faces are searched at once, and more only as long as they cross few.
-  constexpr std::size_t kBlocks = 16, kFewest = 128, kMost = 8192;
+  // One face may cross all others: few groups are searched at once, and more only as long as their faces cross few.
+  constexpr std::size_t kBlocks = 16, kFewest = 16, kMost = 1024;
   std::vector<std::vector<glm::uvec2>> of_block(kBlocks);
   std::size_t at_once = kFewest, count;
-  for (std::size_t first = 0; first < triangles.size() && found.complete; first += count) {
-    count = std::min(at_once, triangles.size() - first);
+  for (std::size_t first = 0; first < near.group_count() && found.complete; first += count) {
+    count = std::min(at_once, near.group_count() - first);
     const std::size_t block = at_once / kBlocks, before = found.pairs.size(), more = most - before;
     team.run(count, block, [&](std::size_t begin, std::size_t end) {
       std::vector<glm::uvec2>& pairs = of_block[begin / block];
       pairs.clear();
-      for (std::size_t i = first + begin; i < first + end && pairs.size() <= more; ++i) {
-        append_pairs(static_cast<std::uint32_t>(i), mesh, near, pairs);
+      for (std::size_t group = first + begin; group < first + end && pairs.size() <= more; ++group) {
+        append_pairs(group, mesh, near, pairs);
       }
     });
     for (std::size_t i = 0; i * block < count && found.complete; ++i) {
       found.pairs.insert(found.pairs.end(), of_block[i].begin(), of_block[i].end());
       found.complete = found.pairs.size() <= most;
     }
-    at_once = found.pairs.size() - before > count ? kFewest : std::min(2 * at_once, kMost);
-    if (progress) progress->update(static_cast<double>(first) / static_cast<double>(triangles.size()));
+    at_once = found.pairs.size() - before > 8 * count ? kFewest : std::min(2 * at_once, kMost);
+    if (progress) progress->update(static_cast<double>(first) / static_cast<double>(near.group_count()));
   }
   if (!found.complete) found.pairs.resize(most);
+  std::ranges::sort(found.pairs,
+                    [](const glm::uvec2& a, const glm::uvec2& b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
   return found;
 }
 

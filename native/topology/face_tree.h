@@ -9,6 +9,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "base/call.h"
 #include "base/parallel.h"
 #include "geometry/triangle_mesh.h"
 
@@ -51,6 +52,13 @@ class FaceTree {
   template <class May, class Visit>
   void for_each_where(May&& may, Visit&& visit) const;
 
+  /// The number of leaves, between which pairs of faces are shared out.
+  std::size_t leaf_count() const { return leaves_; }
+  /// Calls visit(a, b) for pairs of faces whose boxes meet: over all leaves once for each pair. A search for the faces
+  /// of a leaf together takes a fraction of the time of a search for each.
+  template <class Visit>
+  void for_each_pair(std::size_t leaf, Visit&& visit) const;
+
  private:
   std::size_t slot_of(std::uint32_t face) const;
   void fit_leaf(std::size_t leaf);
@@ -85,6 +93,34 @@ void FaceTree::for_each_where(May&& may, Visit&& visit) const {
         if (!visit(numbers_[i])) return;
       } else {
         visit(numbers_[i]);
+      }
+    }
+  }
+}
+
+template <class Visit>
+void FaceTree::for_each_pair(std::size_t leaf, Visit&& visit) const {
+  struct Subtree {
+    std::size_t node, first, count;  // of the leaves
+  };
+  const Box& own = nodes_[leaves_ - 1 + leaf];
+  std::array<Subtree, 66> stack;
+  std::size_t height = 0, met = 0;
+  stack[height++] = {0, 0, leaves_};
+  while (height > 0) {
+    const auto [node, first, count] = stack[--height];
+    // The pairs with faces of an earlier leaf are that leaf's.
+    if (first + count <= leaf || !meet(nodes_[node], own)) continue;
+    if (count > 1) {
+      const std::size_t half = count / 2;
+      stack[height++] = {2 * node + 2, first + half, half}, stack[height++] = {2 * node + 1, first, half};
+      continue;
+    }
+    poll_at(++met);
+    for (std::size_t i = leaf * slots_of_leaf_; i < (leaf + 1) * slots_of_leaf_; ++i) {
+      if (!meet(boxes_[i], nodes_[node])) continue;
+      for (std::size_t k = first == leaf ? i + 1 : first * slots_of_leaf_; k < (first + 1) * slots_of_leaf_; ++k) {
+        if (meet(boxes_[i], boxes_[k])) visit(numbers_[i], numbers_[k]);
       }
     }
   }

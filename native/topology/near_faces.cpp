@@ -68,7 +68,10 @@ NearFaces::NearFaces(std::span<const std::uint32_t> faces, const std::function<C
   others_ = FaceTree(rest.faces, rest.rims, team);
   faces_.assign(faces.begin(), faces.end());
   is_gone_.assign(faces.size(), false);
-  for (const Group* const group : group_of) crowd_of_.push_back(group->number);
+  for (std::uint32_t place = 0; place < faces.size(); ++place) {
+    crowd_of_.push_back(group_of[place]->number);
+    if (group_of[place] != &rest) crowded_.push_back(place);
+  }
 }
 
 void NearFaces::change(std::uint32_t face, const Corners& corners) {

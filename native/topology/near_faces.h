@@ -68,6 +68,13 @@ class NearFaces {
     for_each_near(box_of(own), std::array{Own{own}}, visit);
   }
 
+  /// Into so many groups all faces are divided, of up to eight each, to search pairs of faces.
+  std::size_t group_count() const { return others_.leaf_count() + crowded_.size(); }
+  /// Calls visit(a, b) for all pairs of faces that cross, and for some others whose boxes meet: over all groups once
+  /// for each pair. No face may have been changed or removed.
+  template <class Visit>
+  void for_each_pair(std::size_t group, Visit&& visit) const;
+
  private:
   /// Of at most so many faces each is asked whether it is apart from faces around a hub.
   static constexpr std::size_t kFew = 32;
@@ -105,7 +112,22 @@ class NearFaces {
   std::vector<std::uint32_t> crowd_of_;  ///< for each of faces_; crowds_.size() for one without a hub
   std::vector<Corners> corners_;         ///< for each of faces_ that is in a crowd
   std::vector<bool> is_gone_;            ///< for each of faces_ that is in a crowd
+  std::vector<std::uint32_t> crowded_;   ///< the places in faces_ of those in a crowd
 };
+
+template <class Visit>
+void NearFaces::for_each_pair(std::size_t group, Visit&& visit) const {
+  if (group < others_.leaf_count()) {
+    others_.for_each_pair(group, visit);
+    return;
+  }
+  const std::uint32_t place = crowded_[group - others_.leaf_count()], own = faces_[place];
+  for_each_near(corners_[place], [&](std::uint32_t other) {
+    const bool is_for_other = crowd_of_[place_of(other)] < crowds_.size() && other <= own;
+    if (!is_for_other) visit(own, other);
+    return true;
+  });
+}
 
 template <class Faces, class Visit>
 void NearFaces::for_each_near(const Box& all, const Faces& own, Visit&& visit) const {
