@@ -301,17 +301,24 @@ def test_a_face_whose_centroid_is_rounded_into_another_cell_is_kept(tmp_path):
 
 
 def test_the_cells_fit_the_memory_and_the_last_round_is_whole_if_it_can_be(tmp_path):
-    mesh = MappedMesh(written(tmp_path / "a.ply", *noisy()))
+    vertices, triangles = noisy()
+    mesh = MappedMesh(written(tmp_path / "a.ply", vertices, triangles))
+    everything = soups.write(tmp_path / "everything", vertices[triangles])
+    little = soups.write(tmp_path / "little", vertices[triangles][::20])
 
-    def cells(triangles, each):
-        return [len(cells.boxes) for cells in plan.Plan(mesh, 0.01, plan.FIXED + triangles * each).rounds]
+    def cells(memory, left):
+        planned = plan.Plan(mesh, 0.01, plan.FIXED + memory)
+        return len(planned.first.boxes), *(len(planned.later([left], turn).boxes) for turn in (1, 2))
 
-    assert cells(mesh.count, plan.OF_FIRST) == [1]
-    few, last = cells(mesh.count, plan.OF_LATER)
-    assert few == 2 and last == 1
-    many = cells(1000, plan.OF_FIRST)
-    assert len(many) == 5 and mesh.count / 1000 <= many[0] < 2 * mesh.count / 1000
-    assert min(many[1:]) <= max(many[1:]) < many[0]
+    assert cells(mesh.count * plan.OF_FIRST, everything)[0] == 1
+    assert cells(mesh.count * (plan.OF_REFERENCE + plan.OF_MESH), everything) == (1, 1, 1)
+    of_little = mesh.count * plan.OF_REFERENCE + little.count * plan.OF_MESH
+    assert cells(of_little, little) == (3, 1, 1)
+    # Where nothing has gone, later rounds need as many cells as the first.
+    assert min(cells(of_little, everything)) >= 3
+    first, *rest = cells(1000 * plan.OF_FIRST, little)
+    assert mesh.count / 1000 <= first < 2 * mesh.count / 1000
+    assert max(rest) < 0.6 * first
 
 
 def test_too_little_memory_is_refused_with_what_is_needed(tmp_path):
@@ -343,7 +350,7 @@ def test_hopelessly_little_memory_for_many_triangles_is_refused_after_few_tries(
 
 def test_a_run_that_goes_on_does_no_finished_step_again(tmp_path):
     mesh = MappedMesh(written(tmp_path / "a.ply", *noisy()))
-    cells = plan.Plan(mesh, 0.02, plan.FIXED + 2000 * plan.OF_FIRST)
+    planned = plan.Plan(mesh, 0.02, plan.FIXED + 2000 * plan.OF_FIRST)
     done = []
 
     def run(last):
@@ -356,14 +363,14 @@ def test_a_run_that_goes_on_does_no_finished_step_again(tmp_path):
 
         folder = Scratch(tmp_path / "scratch", {}, resume=bool(done))
         try:
-            Rounds(mesh, cells, folder, 0.02, OPTIONS, each).run()
+            Rounds(mesh, planned, folder, 0.02, OPTIONS, each).run()
         finally:
             folder.close(discard=False)
 
     with pytest.raises(KeyboardInterrupt):
         run("round 3")
     before = {title for title, _ in done}
-    assert {title.partition(" of")[0] for title in before} == {"reading", "round 1", "round 2"}
+    assert before == {"reading", "round 1", "round 2"}
     done.clear()
     done.append(("interrupted", None))
     run("nothing")

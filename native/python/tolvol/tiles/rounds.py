@@ -13,6 +13,7 @@ import numpy as np
 from ..shared.proof.verdict import Interval
 from . import scratch, soups, tile
 from .cells import Box, centroids
+from .plan import MOST_ROUNDS
 from .soups import Soup
 from .tile import Tile
 
@@ -66,25 +67,25 @@ class Rounds:
     def run(self):
         """Returns the Result. Raises NotWritten where the scratch folder is full, after which the run can go on."""
         reference = present = self._reference()
-        made, angles, warnings = [], [0.0], {}
-        rounds = self._plan.rounds
-        for number, cells in enumerate(rounds):
-            if len(made) > 1 and len(cells.boxes) > 1 and made[-1][1] > (1 - _LEAST_GAIN) * made[-2][1]:
-                continue
+        made, angles, warnings, cells = [], [0.0], {}, None
+        for number in range(MOST_ROUNDS):
+            boxes = self._cells(number, present, made)
+            if not boxes:
+                break
+            cells = boxes
             # The first of several rounds leaves so many triangles between the cells that a thorough search is in vain.
-            options = self._options if number or len(rounds) == 1 else {**self._options, "effort": "fast"}
+            options = self._options if number or len(cells) == 1 else {**self._options, "effort": "fast"}
             like = Tile(None, present, reference, self._tolerance, options, self._plan.grid_memory())
-            title = f"round {number + 1} of {len(rounds)}"
-            done = self._steps("decimation", title, f"round{number}", decimate, like, cells)
+            done = self._steps("decimation", f"round {number + 1}", f"round{number}", decimate, like, cells)
             before, present = present, tuple(Soup.read_from(record["soup"]) for record in done)
             if before != reference:
                 self._scratch.remove_soups(before)
             angles += [record["angle"] for record in done]
             warnings |= dict.fromkeys(text for record in done for text in record["warnings"])
-            made.append((len(cells.boxes), sum(soup.count for soup in present)))
+            made.append((len(cells), sum(soup.count for soup in present)))
         vertices, triangles = tile.mesh_of(np.concatenate([soup.corners() for soup in present]))
         like = Tile(None, present, reference, self._tolerance, self._options)
-        measured = self._steps("certify", "certifying", "measured", measure, like, rounds[-1])
+        measured = self._steps("certify", "proving", "measured", measure, like, cells)
         forward, backward = (
             Interval(max(record[way][0] for record in measured), max(record[way][1] for record in measured))
             for way in ("forward", "backward")
@@ -96,7 +97,7 @@ class Rounds:
         """Returns the soups of the triangles of the file, each of a part of space."""
         if record := self._scratch.record("reference"):
             return tuple(map(Soup.read_from, record["soups"]))
-        parts = self._plan.parts(_PARTS * len(self._plan.rounds[0].boxes))
+        parts = self._plan.parts(_PARTS * len(self._plan.first.boxes))
         writers = [soups.Writer(self._scratch.path(f"reference_{i:05}")) for i in range(len(parts.boxes))]
 
         def write(corners, progress):
@@ -113,11 +114,28 @@ class Rounds:
         self._scratch.keep("reference", {"soups": [soup.record() for soup in found]})
         return found
 
+    def _cells(self, number, present, made):
+        """Returns the boxes of the cells of a round, or None if there is no such round.
+
+        They are kept, because the soups that they depend on are removed.
+        """
+        if record := self._scratch.record(f"cells{number}"):
+            return [Box(*map(tuple, box)) for box in record["boxes"]]
+        if not number:
+            cells = self._plan.first
+        elif made[-1][0] == 1:
+            return None
+        else:
+            cells = self._plan.later(present, number)
+            is_vain = len(made) > 1 and made[-1][1] > (1 - _LEAST_GAIN) * made[-2][1]
+            if not cells or (is_vain and len(cells.boxes) > 1):
+                return None
+        self._scratch.keep(f"cells{number}", {"boxes": [(box.lower, box.upper) for box in cells.boxes]})
+        return cells.boxes
+
     def _steps(self, stage, title, name, work, like, cells):
         """Returns the records of the work in all cells, and does what has none yet."""
-        jobs = [
-            (replace(like, cell=box), str(self._scratch.path(f"{name}_{i:05}"))) for i, box in enumerate(cells.boxes)
-        ]
+        jobs = [(replace(like, cell=box), str(self._scratch.path(f"{name}_{i:05}"))) for i, box in enumerate(cells)]
         missing = [job for i, job in enumerate(jobs) if self._scratch.record(f"{name}_{i:05}") is None]
         for _ in self._each(stage, title, work, missing):
             pass
