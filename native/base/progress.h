@@ -25,17 +25,28 @@ class Progress {
   void finish() { finishing_.store(true, std::memory_order_relaxed); }
   bool finishing() const { return finishing_.load(std::memory_order_relaxed); }
 
+  /// Makes the stages of the next call the part from `first` to `last` of one stage, so that the fraction grows over
+  /// two calls of a kind. To be called while no call uses the object.
+  void show_as(double first, double last) { first_ = first, last_ = last; }
   void begin(const char* stage) {
-    fraction_.store(0, std::memory_order_relaxed);
+    fraction_.store(first_, std::memory_order_relaxed);
     stage_.store(stage, std::memory_order_relaxed);
   }
-  /// This is cheap enough to be called every few thousand steps. Throws Cancelled once cancel() was called.
+  /// This is cheap enough to be called every few thousand steps. The fraction of a stage never falls, whichever thread
+  /// is the last to update it. Throws Cancelled once cancel() was called.
   void update(double fraction) {
-    fraction_.store(fraction, std::memory_order_relaxed);
+    const double shown = first_ + fraction * (last_ - first_);
+    double before = fraction_.load(std::memory_order_relaxed);
+    while (before < shown && !fraction_.compare_exchange_weak(before, shown, std::memory_order_relaxed)) {
+    }
+    poll();
+  }
+  void poll() const {
     if (cancelled()) throw Cancelled();
   }
 
  private:
+  double first_ = 0, last_ = 1;
   std::atomic<double> fraction_{0};
   std::atomic<const char*> stage_{""};
   std::atomic<std::size_t> count_{0};

@@ -236,7 +236,7 @@ std::vector<std::uint32_t> MovingCrossings::failing(std::span<const std::uint32_
   std::vector<std::uint32_t> result;
   const auto look = [&](auto&& of_face) {
     parallel_for(asked.size(), kFacesAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
-      if (progress) progress->update(progress->fraction());
+      if (progress) progress->poll();
       for (std::size_t i = begin; i < end; ++i) of_face(asked[i], found[begin / kFacesAtOnce]);
     });
     for (std::vector<glm::uvec2>& pairs : found) {

@@ -191,7 +191,7 @@ void MovingMesh::measure(std::span<const std::uint32_t> faces, Progress* progres
   }
   try {
     parallel_for(unknown.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
-      if (progress) progress->update(progress->fraction());
+      if (progress) progress->poll();
       for (std::size_t i = begin; i < end; ++i) {
         VertexState& state = trial_[unknown[i]];
         state.bound = bound_at(unknown[i], state.at, Aim::wish);
@@ -205,7 +205,7 @@ void MovingMesh::measure(std::span<const std::uint32_t> faces, Progress* progres
 
 /// Writes trial_distance_ of all these faces.
 std::vector<std::uint32_t> MovingMesh::failing(std::span<const std::uint32_t> faces, Progress* progress) {
-  if (progress) progress->update(progress->fraction());
+  if (progress) progress->poll();
   std::vector<std::uint32_t> open = select(faces.size(), threads_, [&](std::size_t i) {
     const FaceBound bound = bound_by_motion(faces[i]);
     set_trial_bound(faces[i], bound);
@@ -220,7 +220,7 @@ std::vector<std::uint32_t> MovingMesh::uncertified(std::span<const std::uint32_t
   measure(faces, progress);
   std::vector<std::uint8_t> failed(faces.size());
   parallel_for(faces.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
-    if (progress) progress->update(progress->fraction());
+    if (progress) progress->poll();
     for (std::size_t i = begin; i < end; ++i) {
       const FaceBound bound = bound_by_certificate(faces[i]);
       set_trial_bound(faces[i], bound);

@@ -187,7 +187,7 @@ std::vector<std::uint32_t> MovingMesh::turned(std::span<const std::uint32_t> fac
   const std::vector<std::uint32_t> open = failing(faces, progress);
   std::vector<std::uint8_t> turned(open.size());
   parallel_for(open.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
-    if (progress) progress->update(progress->fraction());
+    if (progress) progress->poll();
     for (std::size_t i = begin; i < end; ++i) {
       for_triangles(open[i], [&](std::size_t k, const TriangleCorners& at, const auto&) {
         std::optional<Facing> facing;
@@ -208,7 +208,7 @@ void MovingMesh::accept_proved(std::span<const std::uint32_t> vertices, std::spa
   accept(vertices, faces);
   if (!facing_) return;
   parallel_for(open.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
-    if (progress) progress->update(progress->fraction());
+    if (progress) progress->poll();
     for (std::size_t i = begin; i < end; ++i) limit_angle(open[i]);
   });
 }

@@ -167,7 +167,7 @@ void PullBack::let_go(std::vector<Held>& held, Mode mode, Progress* progress) {
       any = any || !turn.empty();
       raised.assign(turn.size(), 0);
       parallel_for(turn.size(), kFewAtOnce, mesh_.threads(), [&](std::size_t begin, std::size_t end) {
-        if (progress) progress->update(progress->fraction());
+        if (progress) progress->poll();
         for (std::size_t i = begin; i < end; ++i) {
           Held& h = held[turn[i]];
           const double factor = h.factor;

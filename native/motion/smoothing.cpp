@@ -198,7 +198,7 @@ class Smoothing {
   template <class Body>
   void each(std::size_t count, Body&& body) {
     parallel_for(count, kManyAtOnce, options_.threads, [&](std::size_t begin, std::size_t end) {
-      if (options_.progress) options_.progress->update(options_.progress->fraction());
+      if (options_.progress) options_.progress->poll();
       for (std::size_t i = begin; i < end; ++i) body(static_cast<std::uint32_t>(i));
     });
   }

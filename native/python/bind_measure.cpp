@@ -114,7 +114,10 @@ between a scan of 270,000 triangles and its decimation to 200 take 0.1 s each.)d
         const TriangleMesh a = to_mesh(va, ta, "_a"), b = to_mesh(vb, tb, "_b");
         const HausdorffOptions options{bound, to_threads(threads), progress};
         const Interruptible call(progress);
-        return BothWays{hausdorff(a, b, options), hausdorff(b, a, options)};
+        if (progress) progress->show_as(0, 0.5);
+        const HausdorffInterval forward = hausdorff(a, b, options);
+        if (progress) progress->show_as(0.5, 1);
+        return BothWays{forward, hausdorff(b, a, options)};
       },
       py::arg("vertices_a"), py::arg("triangles_a"), py::arg("vertices_b"), py::arg("triangles_b"), py::kw_only(),
       py::arg("bound") = py::none(), py::arg("threads") = py::none(), py::arg("progress") = py::none(),

@@ -9,11 +9,17 @@ void bind_progress(pybind11::module_& module) {
   py::class_<Progress>(module, "Progress", py::module_local(),
                        R"doc(Shows to another thread how far a long call is, and lets that thread stop it.
 
-There are no callbacks: the other thread reads the attributes from time to time. Use a new object for each call.)doc")
+There are no callbacks: the other thread reads the attributes from time to time. Use a new object for each call, or for
+some calls that are steps of one.)doc")
       .def(py::init<>(), "Make an object for one call.")
       .def_property_readonly("fraction", &Progress::fraction,
                              "The share of the current stage that is done, from 0 to 1.")
       .def_property_readonly("stage", &Progress::stage, "The name of the current stage, in a few words.")
+      .def(
+          "show_as", &Progress::show_as, py::arg("first"), py::arg("last"),
+          R"doc(Make the next call the part from `first` to `last` of its stage, so that two calls of a kind look like one.
+
+For this, the first call is shown as 0 to 0.5 and the second one as 0.5 to 1.)doc")
       .def_property_readonly("count", &Progress::count,
                              "A number that belongs to the stage: in decimation the triangles that are left.")
       .def_property_readonly("cancelled", &Progress::cancelled, "Whether cancel() was called.")

@@ -67,6 +67,17 @@ def test_progress_moves_while_python_runs_on():
     assert not progress.cancelled
 
 
+def test_progress_does_not_go_back_between_the_directions():
+    progress, thread, outcome = watch(CALLS["hausdorff"])
+    seen = []
+    while thread.is_alive():
+        seen.append(progress.fraction)
+        time.sleep(0.0005)
+    assert not isinstance(outcome[0], Exception)
+    assert seen == sorted(seen) and 0.4 < seen[-1] <= 1
+    assert any(0 < fraction < 0.5 for fraction in seen)
+
+
 def test_cancel_from_another_thread():
     progress, thread, outcome = watch(CALLS["decimate"])
     while thread.is_alive() and progress.fraction == 0:

@@ -87,5 +87,12 @@ def both_ways(surface, reference, tolerance=None, threads=None, progress=None, a
     """Returns two Intervals: of the surface from the reference, and of the reference from the surface."""
     own, other = _content(surface), _content(reference)
     judge = (tolerance, threads, progress, again)
-    forward = _largest(_key(own, other), surface, reference, *judge)
-    return forward, _largest(_key(other, own), reference, surface, *judge)
+    steps = ((_key(own, other), surface, reference), (_key(other, own), reference, surface))
+    found = []
+    for number, step in enumerate(steps):
+        if progress is not None:
+            progress.show_as(number / 2, (number + 1) / 2)
+        found.append(_largest(*step, *judge))
+    if progress is not None:
+        progress.show_as(0, 1)
+    return tuple(found)
