@@ -126,10 +126,14 @@ class Run:
         return None
 
     def begin_modal(self, context, modal):
-        """Makes `modal`, an operator, receive Blender's events from now on. It passes them to on_event()."""
+        """Makes `modal`, an operator, receive Blender's events from now on, unless it is None, because it does so already.
+
+        It passes them to on_event().
+        """
         manager = context.window_manager
         self._timer = manager.event_timer_add(_TICK, window=context.window)
-        manager.modal_handler_add(modal)
+        if modal is not None:
+            manager.modal_handler_add(modal)
         interruptions.runs.append(self)
         context.view_layer.update()  # What has changed before is no other change.
         self.something_else = False

@@ -3,11 +3,13 @@
 
 import tempfile
 from pathlib import Path
+from unittest import mock
 
 import bpy
 
 import job_time
 from addon import job, status_bar
+from addon.job import operator
 from scenes import world_triangles
 from test_panel import assert_proved, monkey, stored, suzanne
 from window import (
@@ -67,6 +69,50 @@ def test_an_undo_ends_a_job():
         bpy.ops.ed.undo()
     yield from ends(said, "Decimate in Tolerance was stopped, because a step was undone. It has changed nothing")
     assert stored() == before and suzanne().tolvol.snapshot is None
+
+
+def begin_large(soon):
+    """Presses Decimate as if its mesh were so large that Blender waits for it. soon: the seconds until it is read."""
+    with window_context(), mock.patch.multiple(operator, LARGE=1, _SOON=soon):
+        assert bpy.ops.tolvol.decimate("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    assert not job.under_way()
+
+
+def test_that_an_operator_has_begun_is_shown_before_a_large_mesh_is_read():
+    yield from reset(monkey)
+    before, reference, percent = stored(), world_triangles(suzanne()), suzanne().tolvol.tolerance_percent
+    with mock.patch.object(status_bar, "show", wraps=status_bar.show) as show:
+        begin_large(0.02)
+        assert [call.args for call in show.call_args_list] == [("Decimate in Tolerance: Preparing    Esc: Cancel",)]
+    yield from finished(lambda: suzanne().tolvol.snapshot is not None and not job.under_way())
+    assert_proved(suzanne(), reference, percent)
+    xdotool("mousemove", *centre())
+    yield
+    key("ctrl+z")
+    yield from finished(lambda: stored() == before)
+    assert suzanne().tolvol.snapshot is None
+
+
+def test_esc_before_a_large_mesh_is_read_cancels_the_operator():
+    yield from reset(monkey)
+    said = len(reports())
+    begin_large(60)
+    xdotool("mousemove", *centre())
+    yield
+    screenshot("job 4 preparing")
+    assert status_bar.showing()
+    xdotool("key", "Escape")
+    yield from ends(said, "Decimate in Tolerance was cancelled. It has changed nothing")
+    assert suzanne().tolvol.snapshot is None
+
+
+def test_an_operator_that_cannot_work_any_more_when_a_large_mesh_would_be_read_says_so():
+    yield from reset(monkey)
+    said = len(reports())
+    begin_large(0.2)
+    bpy.context.view_layer.objects.active = None
+    yield from finished(lambda: len(reports()) > said)
+    yield from ends(said, "Decimate in Tolerance was stopped, because the selection or the mode has changed")
 
 
 def rotation():
