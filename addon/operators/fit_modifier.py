@@ -350,5 +350,5 @@ class _Trial:
         return (
             f"{word}: {len(self.surface.arrays.triangles):,} -> {self.left:,} triangles, tolerance "
             f"{100 * self.tolerance / self.size:.4g} % = {self.tolerance:.3g}, result within {forward}, reference within "
-            f"{backward} (certified)"
+            f"{backward} (proved)"
         )

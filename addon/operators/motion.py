@@ -172,7 +172,7 @@ class Motion:
         return (
             f"{self.verdict(certified).word}: {', '.join(remarks)}, "
             f"tolerance {100 * self.tolerance / self.size:.4g} % = {self.tolerance:.3g}, "
-            f"result within {forward}, reference within {backward} (certified)"
+            f"result within {forward}, reference within {backward} (proved)"
         )
 
     def count_moved(self, vertices):

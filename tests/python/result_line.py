@@ -5,7 +5,7 @@ import re
 
 LINE = re.compile(
     r"([\d,]+) -> ([\d,]+) triangles(?: \((.*)\))?, tolerance ([\d.e-]+) % = ([\d.e-]+), result within ([\d.e+-]+) %, "
-    r"reference within ([\d.e+-]+) %(?:, normals within [\d.]+\N{DEGREE SIGN})? \(certified\), [\d.]+ s"
+    r"reference within ([\d.e+-]+) %(?:, normals within [\d.]+\N{DEGREE SIGN})? \(proved\), [\d.]+ s"
 )
 
 

@@ -6,7 +6,7 @@ from .arguments import above_zero, angle, file_name, length, several, whole_numb
 
 DESCRIPTION = """\
 Reduces the triangles of the meshes of IN within the tolerance and writes the meshes to OUT. The written file is read back and
-certified before it is moved to OUT."""
+proved before it is moved to OUT."""
 
 EPILOG = """\
 The last line of the output gives the result. Its percentages are of the size of the reference (the longest diagonal of the

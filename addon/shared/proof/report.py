@@ -99,7 +99,7 @@ def line(run, seconds=None):
         f"{counts(run)}, "
         f"tolerance {run['tolerance']['percent']:.4g} % = {run['tolerance']['absolute']:.3g}, "
         f"result within {all_digits(run['forward'][1], size)}, reference within {all_digits(run['backward'][1], size)}"
-        f"{normals} ({'certified' if proved(run) else 'not proved'}), {duration(seconds)}"
+        f"{normals} ({'proved' if proved(run) else 'not proved'}), {duration(seconds)}"
     )
 
 
