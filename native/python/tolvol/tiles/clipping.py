@@ -7,6 +7,8 @@ in both cells may miss the same points of it. So what is to miss nothing is clip
 
 import numpy as np
 
+from .cells import ends
+
 # A triangle is shallow against a side if it reaches less than this share of its longest extent across it.
 _SHALLOW = 1 / 16
 # So many times rounding() is the distance by which a triangle that is not shallow may miss points beside the sides of the box.
@@ -38,7 +40,7 @@ def rounding(corners):
 
 def are_shallow(corners, box, margin):
     """Tells which triangles, (k, 3, 3), are shallow against a side of the box that is within `margin`, a length, of them."""
-    lower, upper = corners.min(1).astype(np.float64), corners.max(1).astype(np.float64)
+    lower, upper = (side.astype(np.float64) for side in ends(corners))
     extent = upper - lower
     flat = extent < _SHALLOW * extent.max(1, keepdims=True)
     sides = np.array([box.lower, box.upper])[:, None]

@@ -140,7 +140,9 @@ class MappedMesh:
     def _indexed(self, rows, first):
         self._require_triangles(rows, first)
         index = rows[self._list].astype(np.int64)
-        require_indices(index.min(1), index.max(1), len(self._vertices), 0, first)
+        a, b, c = index.T
+        lowest, highest = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+        require_indices(lowest, highest, len(self._vertices), 0, first)
         corners = np.empty((len(index), 3, 3), self.dtype)
         for axis, name in enumerate("xyz"):
             corners[:, :, axis] = self._vertices[name][index]

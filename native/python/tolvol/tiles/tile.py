@@ -90,10 +90,14 @@ def _largest(those, others, tile, threads, progress):
     corners = soups.gather(those, tile.cell)
     rounding = clipping.rounding(corners)
     box = tile.cell.grown(rounding)
+    inside = tile.cell.strictly_holds_triangles(corners)
+    whole, rest = corners[inside], corners[~inside]
     # Only triangles that hardly leave a side of the cell need the larger box, by which the cells together miss no point: of all
     # others, what a cell misses is near what it has. The larger box makes slivers, which take long to measure.
-    shallow = clipping.are_shallow(corners, tile.cell, rounding)
-    corners = np.concatenate([clipping.clipped(corners[~shallow], tile.cell), clipping.clipped(corners[shallow], box)])
+    shallow = clipping.are_shallow(rest, tile.cell, rounding)
+    corners = np.concatenate(
+        [whole, clipping.clipped(rest[~shallow], tile.cell), clipping.clipped(rest[shallow], box)], dtype=np.float64
+    )
     rounding *= clipping.STEEP_LOSS
     if not len(corners):
         return 0.0, 0.0
