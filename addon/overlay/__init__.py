@@ -17,7 +17,7 @@ from ..proof import labels as kept_labels
 from ..proof import places, probing
 from ..redraw import redraw_views
 from ..reference import snapshots
-from . import annotations, coloured, draw, field, legend, moving, reasons, shaders, shares
+from . import annotations, coloured, draw, field, geometry_buffer, legend, moving, reasons, shaders, shares, square
 from .surface import Surface
 
 _surfaces = {}  # name of an object that shows its deviation -> Surface
@@ -86,6 +86,8 @@ def _end():
     field.keep_only_meshes(set())
     coloured.keep_only([])
     legend.free()
+    geometry_buffer.free()
+    square.free()
     shaders.free()
 
 

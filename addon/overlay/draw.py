@@ -9,7 +9,7 @@ import numpy as np
 from ..proof import verdict
 from ..reference import measurements
 from ..units import typed
-from . import coloured, field, legend, reasons, shaders, shares
+from . import coloured, field, geometry_buffer, legend, reasons, shaders, shares, square
 from .coloured import Coloured, tolerance_of
 from .scale import Scale
 
@@ -92,7 +92,6 @@ def surfaces(context, shown):
     gpu.state.depth_test_set("LESS_EQUAL")
     # NEARER may let two layers pass the depth test at one pixel. Writing depths makes the nearer layer visible.
     gpu.state.depth_mask_set(True)
-    gpu.state.blend_set("ALPHA")
     references = [ob for ob in drawn if coloured.is_reference(ob)]
     for ob in drawn.keys() - set(references):
         _draw(context, ob, drawn[ob])
@@ -119,10 +118,11 @@ def _draw(context, ob, drawn):
         _STRIPE * context.preferences.system.ui_scale,
         ob.tolvol.deviation_opacity * (shading.xray_alpha if x_ray else 1),
     )
+    buffer = geometry_buffer.of_size(*gpu.state.viewport_get()[2:])
+    _fill(buffer, drawn, told)
     shader = shaders.surface()
     shader.bind()
-    shader.uniform_sampler("transfer", shaders.transfer(drawn.scale.signed, drawn.palette))
-    what.field.bind(shader)
+    shader.uniform_sampler("colours", buffer.colours)
     shader.uniform_block("told", told)
     if x_ray or coloured.is_reference(ob):
         # The depth buffer is empty, or was cleared. A first pass writes the depths, so that the second draws only the
@@ -140,6 +140,28 @@ def _draw(context, ob, drawn):
         for selected, colour in ((False, theme.wire_edit), (True, theme.edge_select)):
             shader.uniform_float("flat_colour", (*colour, 1))
             what.triangles.draw_edges(shader, what.to_frame, selected)
+
+
+def _fill(buffer, drawn, told):
+    """Draws a surface into a geometry buffer, and computes the colours of its pixels."""
+    what = drawn.what
+    gpu.state.blend_set("NONE")
+    with buffer.of_places.bind():
+        buffer.of_places.clear(color=(0, 0, 0, 0), depth=1)
+        shader = shaders.geometry()
+        shader.bind()
+        shader.uniform_block("told", told)
+        what.triangles.draw(shader, what.to_frame)
+    with buffer.of_colours.bind():
+        shader = shaders.colours()
+        shader.bind()
+        shader.uniform_sampler("transfer", shaders.transfer(drawn.scale.signed, drawn.palette))
+        shader.uniform_sampler("places", buffer.places)
+        shader.uniform_sampler("lights", buffer.light)
+        what.field.bind(shader)
+        shader.uniform_block("told", told)
+        square.unit().draw(shader)
+    gpu.state.blend_set("ALPHA")
 
 
 def _eye(view, world_to_frame):

@@ -7,7 +7,7 @@ import gpu
 from ..shared.numbers import NO_BREAK
 from ..shared.proof.verdict import FAIL, NOT_CHECKED, PASS
 from ..units import length
-from . import shaders
+from . import shaders, square
 
 # Blender's own font has this number.
 _FONT = 0
@@ -32,23 +32,8 @@ _MOST_WIDTH, _MOST_HEIGHT = 0.5, 0.75
 # The colours of Blender's icons in the panel. The word beside them says the same without colours.
 _COLOURS = {PASS: (0.47, 0.8, 0.43), FAIL: (0.88, 0.38, 0.35), NOT_CHECKED: (0.6, 0.6, 0.6)}
 
-_unit_square = None
-
-
-def _square():
-    global _unit_square
-    if _unit_square is None:
-        layout = gpu.types.GPUVertFormat()
-        layout.attr_add(id="position", comp_type="F32", len=2, fetch_mode="FLOAT")
-        buffer = gpu.types.GPUVertBuf(layout, 4)
-        buffer.attr_fill("position", [(0, 0), (1, 0), (0, 1), (1, 1)])
-        _unit_square = gpu.types.GPUBatch(type="TRI_STRIP", buf=buffer)
-    return _unit_square
-
 
 def free():
-    global _unit_square
-    _unit_square = None
     _boxes.clear()
 
 
@@ -75,7 +60,7 @@ class Page:
         detail = bands if kind == shaders.BAR else _STRIPE * self.scale
         shader.uniform_float("fill", (kind, shaders.lowest(self.signed), detail))
         gpu.state.blend_set("ALPHA")
-        _square().draw(shader)
+        square.unit().draw(shader)
         gpu.state.blend_set("NONE")
 
     def text(self, x, y, text, faint=False, points=_POINTS):

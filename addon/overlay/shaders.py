@@ -50,23 +50,50 @@ float banded(float part, float lowest, float bands) {
 }
 """
 
-_SURFACE_FRAGMENT = """
+_GEOMETRY_FRAGMENT = """
 void main() {
+  vec3 normal = cross(dFdx(place), dFdy(place));
+  seen = vec4(place, 1.0);
+  light = head_light(normal, normalize(told.eye.xyz - told.eye.w * place));
+}
+"""
+
+_VIEW_VERTEX = """
+void main() {
+  part = position;
+  gl_Position = vec4(2.0 * position - 1.0, 0.0, 1.0);
+}
+"""
+
+_COLOURS_FRAGMENT = """
+void main() {
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  float light = texelFetch(lights, pixel, 0).r;
+  if (light == 0.0) {
+    shown = vec4(0.0);
+    return;
+  }
   // The search reaches a little beyond the tolerance, so that a distance just beyond it is told from one within. It reaches
   // farther if what is beyond has colours.
   float far = told.range > 1.0 ? FAR * told.range : 1.0;
   float reach = 1.001 * far * told.tolerance + 2.0 * ROUNDING;
+  vec3 place = texelFetch(places, pixel, 0).xyz;
   float d = surface_distance(nodes, corners, int(told.leaves), place, reach, ROUNDING) / told.tolerance;
-  vec3 normal = cross(dFdx(place), dFdy(place));
-  vec3 to_eye = normalize(told.eye.xyz - told.eye.w * place);
-  vec3 colour = head_light(normal, to_eye) *
-                distance_colour(transfer, banded(d / told.range, told.lowest, told.bands), told.lowest);
+  vec3 colour = light * distance_colour(transfer, banded(d / told.range, told.lowest, told.bands), told.lowest);
   if (abs(d) > far) {
     colour = outside_colour(gl_FragCoord.xy, told.period, OUTSIDE, STRIPE);
   } else if (abs(d) > 1.0) {
     colour = outside_colour(gl_FragCoord.xy, told.period, OUTSIDE, colour);
   }
-  shown = displayed(colour, told.opacity);
+  shown = vec4(colour, 1.0);
+}
+"""
+
+_SURFACE_FRAGMENT = """
+void main() {
+  vec4 colour = texelFetch(colours, ivec2(gl_FragCoord.xy), 0);
+  if (colour.a == 0.0) discard;
+  shown = displayed(colour.rgb, told.opacity);
 }
 """
 
@@ -112,16 +139,20 @@ ROW = 2048
 FLAT, BAR, STRIPES = 0.0, 1.0, 2.0
 
 
+# What a fragment shader writes, if nothing else is said.
+_WRITTEN = (("VEC4", "shown"),)
+
 # The attributes of a vertex: local, and in the frame of the tree.
 _VERTEX = [("VEC3", "position"), ("VEC3", "framed")]
 
 
-def _info(varying, attributes, vertex, fragment, shared=()):
+def _info(varying, attributes, vertex, fragment, shared=(), written=_WRITTEN):
     """Returns a GPUShaderCreateInfo.
 
     varying: (type, name) of the value that the vertex shader passes to the fragment shader.
     attributes: (type, name) of each attribute that the vertex shader reads.
     shared: files in shaders/ whose functions the fragment shader uses.
+    written: (type, name) of what the fragment shader writes.
     """
     interface = gpu.types.GPUStageInterfaceInfo(f"tolvol_{varying[1]}")
     interface.smooth(*varying)
@@ -129,7 +160,8 @@ def _info(varying, attributes, vertex, fragment, shared=()):
     for i, attribute in enumerate(attributes):
         info.vertex_in(i, *attribute)
     info.vertex_out(interface)
-    info.fragment_out(0, "VEC4", "shown")
+    for i, value in enumerate(written):
+        info.fragment_out(i, *value)
     info.push_constant("BOOL", "srgbTarget")
     info.define("ROUNDED", "2.4e-7")  # four times 2^-24, the rounding of float32
     for name, colour in zip(("OUTSIDE", "STRIPE"), native.module.OUTSIDE_COLOURS):
@@ -140,28 +172,55 @@ def _info(varying, attributes, vertex, fragment, shared=()):
     return info
 
 
-@functools.cache
-def surface():
-    """Returns the shader that colours a mesh by its distance from the tree in the samplers `nodes` and `corners`.
+def _of_surface(fragment, shared=(), written=_WRITTEN):
+    """Returns the GPUShaderCreateInfo of a shader that draws the triangles of a surface."""
+    info = _info(("VEC3", "place"), _VERTEX, _SURFACE_VERTEX, fragment, shared, written)
+    _add_told(info)
+    info.define("NEARER", "1e-6")
+    return info
 
-    The result of told() has to be bound as the uniform block `told`.
-    """
-    shared = "surface_distance.glsl", "distance_colour.glsl"
-    info = _info(("VEC3", "place"), _VERTEX, _SURFACE_VERTEX, _SURFACE_FRAGMENT, shared)
-    info.sampler(0, "FLOAT_1D", "transfer")
-    info.sampler(1, "FLOAT_2D", "nodes")
-    info.sampler(2, "FLOAT_2D", "corners")
-    info.define("ROW", str(ROW))
-    info.define("ROUNDING", str(native.module.DisplayTree.ROUNDING))
+
+def _add_told(info):
+    """Adds the uniform block `told`, to which the result of told() has to be bound."""
     info.typedef_source(_SURFACE_TOLD)
     info.uniform_buf(0, "Told", "told")
-    info.define("NEARER", "1e-6")
+
+
+@functools.cache
+def geometry():
+    """Returns the shader that draws the triangles of a surface into the places and the light of a geometry buffer."""
+    written = ("VEC4", "seen"), ("FLOAT", "light")
+    return gpu.shader.create_from_info(_of_surface(_GEOMETRY_FRAGMENT, ("distance_colour.glsl",), written))
+
+
+@functools.cache
+def colours():
+    """Returns the shader that fills the colours of a geometry buffer by the distances of its places from a tree.
+
+    The samplers `nodes` and `corners` are the textures of the tree, `places` and `lights` those of the geometry buffer.
+    """
+    shared = "surface_distance.glsl", "distance_colour.glsl"
+    info = _info(("VEC2", "part"), [("VEC2", "position")], _VIEW_VERTEX, _COLOURS_FRAGMENT, shared)
+    info.sampler(0, "FLOAT_1D", "transfer")
+    for i, name in enumerate(("nodes", "corners", "places", "lights")):
+        info.sampler(1 + i, "FLOAT_2D", name)
+    _add_told(info)
+    info.define("ROW", str(ROW))
+    info.define("ROUNDING", str(native.module.DisplayTree.ROUNDING))
     info.define("FAR", str(scale.FAR))
     return gpu.shader.create_from_info(info)
 
 
+@functools.cache
+def surface():
+    """Returns the shader that draws the triangles of a surface with the texture `colours` of a geometry buffer."""
+    info = _of_surface(_SURFACE_FRAGMENT)
+    info.sampler(0, "FLOAT_2D", "colours")
+    return gpu.shader.create_from_info(info)
+
+
 def told(view_projection, model, eye, tolerance, leaves, colours, period, opacity):
-    """Returns the uniform buffer for surface() and lines().
+    """Returns the uniform buffer for geometry(), colours(), surface() and lines().
 
     eye: in the frame of the tree, (x, y, z, 1) for an eye and (x, y, z, 0) for a direction.
     tolerance: in this frame. leaves: how many the tree has. colours: the Scale.
@@ -178,8 +237,7 @@ def lines():
     """Returns the shader that draws edges over the surface, in the colour `flat_colour`."""
     info = _info(("VEC3", "place"), _VERTEX, _SURFACE_VERTEX, _LINES_FRAGMENT)
     info.push_constant("VEC4", "flat_colour")
-    info.typedef_source(_SURFACE_TOLD)
-    info.uniform_buf(0, "Told", "told")
+    _add_told(info)
     info.define("NEARER", "1e-5")
     return gpu.shader.create_from_info(info)
 
@@ -231,5 +289,5 @@ def transfer(signed, palette="SAFE"):
 
 def free():
     """Frees all shaders and textures on the GPU."""
-    for function in (surface, lines, legend, transfer):
+    for function in (geometry, colours, surface, lines, legend, transfer):
         function.cache_clear()

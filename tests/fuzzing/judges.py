@@ -258,12 +258,14 @@ def connected_alike(run, before, after, joins=False):
     """Requires of the welded meshes that the result has no new edges of more than two faces, and that no component was lost,
     joined to another one, or taken apart.
 
-    joins: whether T-junctions were joined. Then sheets that met there may be one component and share edges.
+    Sheets that lie upon each other may get new edges in common, because vertices inside of them are not tied together
+    (docs/architecture.md, "Where sheets meet"). joins: whether T-junctions were joined. Then sheets that met there may be one
+    component and share edges.
     """
     (places, faces), (new_places, new_faces) = proper_faces(*before), proper_faces(*after)
     had = (edge_counts(faces)[1] > 2).sum()
     edges, count = edge_counts(new_faces)
-    if (count > 2).sum() > had and not joins:
+    if (count > 2).sum() > had and not joins and not _lie_on_each_other(places, faces):
         a, b = new_places[edges[count > 2][0]]
         raise Finding("non-manifold", f"{(count > 2).sum()} edges have more than two faces, {had} had: {a} to {b}")
     components, left = _components(faces), _components(new_faces)
