@@ -107,8 +107,11 @@ class Motion:
         return certified | {"solidity": solidity.compared(self._facts_before, facts)}
 
     def _crossing(self, surface, progress):
-        """Returns the pairs of polygons of which triangles cross, at most solidity.MOST_PAIRS of triangles, as a set."""
-        polygons = surface.arrays.polygons[solidity.crossing_pairs(surface.arrays, self.threads, progress)]
+        """Returns the pairs of polygons of which triangles cross as a set. Raises NotProved for solidity.MOST_PAIRS or more."""
+        found = solidity.crossing_pairs(surface.arrays, self.threads, progress)
+        if len(found) >= solidity.MOST_PAIRS:
+            raise NotProved(f"{solidity.pair_count(len(found))} pairs of faces cross, too many to keep others out")
+        polygons = surface.arrays.polygons[found]
         return set(map(tuple, np.sort(polygons, axis=1).tolist()))
 
     def settle(self, vertices, may_hold=True):

@@ -25,9 +25,27 @@ class Progress {
   void finish() { finishing_.store(true, std::memory_order_relaxed); }
   bool finishing() const { return finishing_.load(std::memory_order_relaxed); }
 
-  /// Makes the stages of the next call the part from `first` to `last` of one stage, so that the fraction grows over
-  /// two calls of a kind. To be called while no call uses the object.
-  void show_as(double first, double last) { first_ = first, last_ = last; }
+  /// While it lives, the fractions of all stages are shown as the part from `first` to `last`, at least 0 and at most
+  /// 1, of what would be shown without it: so the fraction grows over several loops, or calls, that are one stage to
+  /// the user. It has to begin and end on the thread that makes the calls. `progress` may be null.
+  class Part {
+   public:
+    Part(Progress* progress, double first, double last) : progress_(progress) {
+      if (!progress_) return;
+      first_ = progress_->first_, last_ = progress_->last_;
+      progress_->first_ = first_ + first * (last_ - first_), progress_->last_ = first_ + last * (last_ - first_);
+    }
+    ~Part() {
+      if (progress_) progress_->first_ = first_, progress_->last_ = last_;
+    }
+    Part(const Part&) = delete;
+    Part& operator=(const Part&) = delete;
+
+   private:
+    Progress* progress_;
+    double first_ = 0, last_ = 1;  // are what they were before
+  };
+
   void begin(const char* stage) {
     fraction_.store(first_, std::memory_order_relaxed);
     stage_.store(stage, std::memory_order_relaxed);

@@ -45,6 +45,9 @@ MovingCoverage::Found MovingCoverage::find_layers(Progress* progress) const {
                             {}});
     found.layers.back().trial.look_for_failures(1);
     found.layers.back().trial.expect_many_elements(mesh_->threads());
+    const double count = static_cast<double>(triangles.size());
+    const Progress::Part part(progress, static_cast<double>(first) / count,
+                              static_cast<double>(first + of_layer) / count);
     find_witnesses(found, progress);
   }
   return found;

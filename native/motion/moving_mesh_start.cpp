@@ -16,6 +16,12 @@
 #include "topology/t_junctions.h"
 
 namespace tolvol {
+namespace {
+
+/// The shares of the stage "checking" at which all faces are certified, and those that fail are compared.
+constexpr double kCertified = 0.6, kCompared = 0.8;
+
+}  // namespace
 
 void require_vertices(std::span<const std::uint32_t> faces, std::size_t corners, std::size_t vertex_count) {
   for (std::size_t i = 0; i < faces.size(); ++i) {
@@ -108,10 +114,13 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, double m
   measure(open, progress);
   std::vector<std::uint32_t> failing = take_uncertified(open, progress);
   std::vector<std::uint8_t> outside(failing.size());
-  parallel_for(failing.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
-    if (progress) progress->update(static_cast<double>(begin) / static_cast<double>(failing.size()));
-    for (std::size_t i = begin; i < end; ++i) outside[i] = !is_inside(failing[i]);
-  });
+  {
+    const Progress::Part part(progress, kCertified, kCompared);
+    parallel_for(failing.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
+      if (progress) progress->update(static_cast<double>(begin) / static_cast<double>(failing.size()));
+      for (std::size_t i = begin; i < end; ++i) outside[i] = !is_inside(failing[i]);
+    });
+  }
   result.outside = chosen(failing, outside);
   for (const std::uint32_t f : result.outside) {
     for (const std::uint32_t v : corners_of(f)) freeze(v);
@@ -121,6 +130,7 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, double m
   std::erase_if(failing, [&](std::uint32_t f) { return std::ranges::binary_search(result.outside, f); });
   failing = compare_sides(std::move(failing), progress);
   std::vector<std::uint8_t> exceeds(failing.size());
+  const Progress::Part part(progress, kCompared, 1);
   parallel_for(failing.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(static_cast<double>(begin) / static_cast<double>(failing.size()));
     for (std::size_t i = begin; i < end; ++i) exceeds[i] = limit_angle(failing[i]);
@@ -132,6 +142,7 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, double m
 /// Certifies faces of the state, and returns those for which there is no proof by a search as in any motion.
 std::vector<std::uint32_t> MovingMesh::take_uncertified(std::span<const std::uint32_t> faces, Progress* progress) {
   std::vector<std::uint8_t> fails(faces.size());
+  const Progress::Part part(progress, 0, kCertified);
   parallel_for(faces.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(static_cast<double>(begin) / static_cast<double>(faces.size()));
     for (std::size_t i = begin; i < end; ++i) {

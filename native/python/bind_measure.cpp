@@ -114,10 +114,12 @@ between a scan of 270,000 triangles and its decimation to 200 take 0.1 s each.)d
         const TriangleMesh a = to_mesh(va, ta, "_a"), b = to_mesh(vb, tb, "_b");
         const HausdorffOptions options{bound, to_threads(threads), progress};
         const Interruptible call(progress);
-        if (progress) progress->show_as(0, 0.5);
-        const HausdorffInterval forward = hausdorff(a, b, options);
-        if (progress) progress->show_as(0.5, 1);
-        return BothWays{forward, hausdorff(b, a, options)};
+        const auto measured = [&](const TriangleMesh& from, const TriangleMesh& to, double first) {
+          const Progress::Part half(progress, first, first + 0.5);
+          return hausdorff(from, to, options);
+        };
+        const HausdorffInterval forward = measured(a, b, 0);
+        return BothWays{forward, measured(b, a, 0.5)};
       },
       py::arg("vertices_a"), py::arg("triangles_a"), py::arg("vertices_b"), py::arg("triangles_b"), py::kw_only(),
       py::arg("bound") = py::none(), py::arg("threads") = py::none(), py::arg("progress") = py::none(),

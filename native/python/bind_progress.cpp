@@ -1,11 +1,34 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "base/progress.h"
+
+#include <optional>
+
+#include "base/errors.h"
 #include "python/module.h"
 
 namespace tolvol::python {
+namespace {
+
+/// The context manager that Progress.part() returns.
+class PartOf {
+ public:
+  PartOf(Progress* progress, double first, double last) : progress_(progress), first_(first), last_(last) {}
+  void enter() { part_.emplace(progress_, first_, last_); }
+  void exit() { part_.reset(); }
+
+ private:
+  Progress* progress_;
+  double first_, last_;
+  std::optional<Progress::Part> part_;
+};
+
+}  // namespace
 
 void bind_progress(pybind11::module_& module) {
   namespace py = pybind11;
+  py::class_<PartOf>(module, "_Part", py::module_local())
+      .def("__enter__", &PartOf::enter)
+      .def("__exit__", [](PartOf& of, const py::args&) { of.exit(); });
   py::class_<Progress>(module, "Progress", py::module_local(),
                        R"doc(Shows to another thread how far a long call is, and lets that thread stop it.
 
@@ -16,10 +39,22 @@ some calls that are steps of one.)doc")
                              "The share of the current stage that is done, from 0 to 1.")
       .def_property_readonly("stage", &Progress::stage, "The name of the current stage, in a few words.")
       .def(
-          "show_as", &Progress::show_as, py::arg("first"), py::arg("last"),
-          R"doc(Make the next call the part from `first` to `last` of its stage, so that two calls of a kind look like one.
+          "part",
+          [](Progress& progress, double first, double last) {
+            if (!(0 <= first && first <= last && last <= 1)) {
+              throw InvalidInput("a part of the progress is from first to last, with 0 <= first <= last <= 1");
+            }
+            return std::make_unique<PartOf>(&progress, first, last);
+          },
+          py::arg("first"), py::arg("last"), py::keep_alive<0, 1>(),
+          R"doc(Return a context manager: within it, the fractions of calls go from `first` to `last` instead of from 0 to 1.
 
-For this, the first call is shown as 0 to 0.5 and the second one as 0.5 to 1.)doc")
+So several calls are one to whoever reads the fraction. The calls have to be made by the thread that entered the context.
+
+Raises
+------
+InvalidInput
+    Unless 0 <= first <= last <= 1.)doc")
       .def_property_readonly("count", &Progress::count,
                              "A number that belongs to the stage: in decimation the triangles that are left.")
       .def_property_readonly("cancelled", &Progress::cancelled, "Whether cancel() was called.")

@@ -80,7 +80,8 @@ Parameters
 vertices : (n, 3) float32 or float64 array
 triangles : (m, 3) integer array
 most : int, optional
-    Stop after this many pairs. Among 100,000 triangles on one place there are five thousand million.
+    Return at most this many pairs. Where there are more, it is not promised which ones. Among 100,000 triangles on one
+    place there are five thousand million.
 threads, progress
     See help(tolvol).
 

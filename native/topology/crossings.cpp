@@ -11,12 +11,14 @@
 namespace tolvol {
 namespace {
 
-/// Appends the pairs that cross of a group of faces.
-void append_pairs(std::size_t group, const MeshView& mesh, const NearFaces& near, std::vector<glm::uvec2>& pairs) {
+/// Appends the pairs that cross of a group of faces, until there are more than `most`.
+void append_pairs(std::size_t group, const MeshView& mesh, const NearFaces& near, std::size_t most,
+                  std::vector<glm::uvec2>& pairs) {
   std::size_t seen = 0;
   near.for_each_pair(group, [&](std::uint32_t a, std::uint32_t b) {
     if (seen++ % 256 == 0) poll();
     if (faces_cross(mesh.corners(a), mesh.corners(b))) pairs.emplace_back(std::min(a, b), std::max(a, b));
+    return pairs.size() <= most;
   });
 }
 
@@ -42,19 +44,23 @@ Crossings crossings(std::span<const glm::dvec3> vertices, std::span<const glm::u
       std::vector<glm::uvec2>& pairs = of_block[begin / block];
       pairs.clear();
       for (std::size_t group = first + begin; group < first + end && pairs.size() <= more; ++group) {
-        append_pairs(group, mesh, near, pairs);
+        append_pairs(group, mesh, near, more, pairs);
       }
     });
     for (std::size_t i = 0; i * block < count && found.complete; ++i) {
       found.pairs.insert(found.pairs.end(), of_block[i].begin(), of_block[i].end());
       found.complete = found.pairs.size() <= most;
     }
-    at_once = found.pairs.size() - before > 8 * count ? kFewest : std::min(2 * at_once, kMost);
+    at_once = found.pairs.size() - before > FaceTree::kLeaf * count ? kFewest : std::min(2 * at_once, kMost);
     if (progress) progress->update(static_cast<double>(first) / static_cast<double>(near.group_count()));
   }
   if (!found.complete) found.pairs.resize(most);
-  std::ranges::sort(found.pairs,
-                    [](const glm::uvec2& a, const glm::uvec2& b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
+  std::size_t compared = 0;
+  const auto key = [](const glm::uvec2& pair) { return std::uint64_t{pair.x} << 32 | pair.y; };
+  std::ranges::sort(found.pairs, [&](const glm::uvec2& a, const glm::uvec2& b) {
+    poll_at(++compared);
+    return key(a) < key(b);
+  });
   return found;
 }
 

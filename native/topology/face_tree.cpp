@@ -9,8 +9,6 @@ namespace {
 
 /// Above this share of a tree's faces, all boxes are fitted anew instead of those above each face.
 constexpr std::size_t kMany = 8;
-/// A leaf has at most this many faces. Fewer would take more nodes, and no less time.
-constexpr std::size_t kLeaf = 8;
 
 bool same(const Box& a, const Box& b) { return a.lower == b.lower && a.upper == b.upper; }
 

@@ -68,7 +68,7 @@ class NearFaces {
     for_each_near(box_of(own), std::array{Own{own}}, visit);
   }
 
-  /// Into so many groups all faces are divided, of up to eight each, to search pairs of faces.
+  /// The number of groups into which for_each_pair() divides the faces: a leaf of a FaceTree, or one face at a hub.
   std::size_t group_count() const { return others_.leaf_count() + crowded_.size(); }
   /// Calls visit(a, b) for all pairs of faces that cross, and for some others whose boxes meet: over all groups once
   /// for each pair. No face may have been changed or removed.
@@ -124,8 +124,7 @@ void NearFaces::for_each_pair(std::size_t group, Visit&& visit) const {
   const std::uint32_t place = crowded_[group - others_.leaf_count()], own = faces_[place];
   for_each_near(corners_[place], [&](std::uint32_t other) {
     const bool is_for_other = crowd_of_[place_of(other)] < crowds_.size() && other <= own;
-    if (!is_for_other) visit(own, other);
-    return true;
+    return is_for_other || visit(own, other);
   });
 }
 

@@ -128,8 +128,12 @@ def test_damaged_scratch_files_are_refused(torus, tmp_path):
     soup.write_bytes(data[:-36])
     refused(decimate(torus, out, "--resume"), soup, "is damaged: remove")
     soup.write_bytes(data)
-    (folder / "round0_00001.json").write_text("{")
-    refused(decimate(torus, out, "--resume"), "round0_00001.json is damaged")
+    for name in ("round0_00001.json", "cells0.json"):
+        record = (folder / name).read_text()
+        for damaged in ("{", record.replace(", ", ",  ", 1)):
+            (folder / name).write_text(damaged)
+            refused(decimate(torus, out, "--resume"), f"{name} is damaged")
+        (folder / name).write_text(record)
     assert not out.exists()
 
 

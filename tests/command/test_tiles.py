@@ -321,6 +321,15 @@ def test_the_cells_fit_the_memory_and_the_last_round_is_whole_if_it_can_be(tmp_p
     assert max(rest) < 0.6 * first
 
 
+def test_there_are_no_cells_for_a_later_round_that_cannot_fit_the_memory(tmp_path):
+    vertices, triangles = noisy()
+    mesh = MappedMesh(written(tmp_path / "a.ply", vertices, triangles))
+    crowded = soups.write(tmp_path / "crowded", np.concatenate([vertices[triangles][:1]] * 2000))
+    planned = plan.Plan(mesh, 0.01, plan.FIXED + 1000 * plan.OF_FIRST)
+    assert planned.later([crowded], 1) is None
+    assert planned.needed([crowded]) == plan.FIXED + mesh.count * plan.OF_REFERENCE + 2000 * plan.OF_MESH
+
+
 def test_too_little_memory_is_refused_with_what_is_needed(tmp_path):
     mesh = MappedMesh(written(tmp_path / "a.ply", *noisy()))
     with pytest.raises(Refused, match=r"--memory: 1 MB is too little: .* need at least \d+ MB"):
@@ -329,11 +338,24 @@ def test_too_little_memory_is_refused_with_what_is_needed(tmp_path):
         plan.Plan(mesh, 1.0, plan.FIXED + 100 * plan.OF_FIRST)
 
 
-def test_cells_know_how_many_points_are_near_them():
-    points = np.random.default_rng(1).normal(size=(3000, 3))
-    cells = Cells(points, 12, 1)
-    expected = [box.grown(0.2).holds(points).sum() for box in cells.boxes]
-    assert cells.count_near(points, 0.2).tolist() == expected and min(expected) > 3000 / 12
+def test_cells_know_how_many_boxes_are_near_them():
+    random = np.random.default_rng(1)
+    lowest = random.normal(size=(3000, 3))
+    highest = lowest + random.exponential(0.1, size=(3000, 3))
+    cells = Cells(lowest, 12, 1)
+    expected = [box.grown(0.2).meets_boxes(lowest, highest).sum() for box in cells.boxes]
+    assert cells.count_near(lowest, highest, 0.2).tolist() == expected and min(expected) > 3000 / 12
+
+
+def test_triangles_that_reach_into_many_cells_need_memory_in_each(tmp_path):
+    random = np.random.default_rng(2)
+    ends = np.repeat(random.normal(size=(2000, 1, 3)), 3, 1)
+    ends[:, 1, 0] += 0.01
+    short = MappedMesh(written(tmp_path / "short.ply", ends.reshape(-1, 3), np.arange(6000).reshape(-1, 3)))
+    ends[:, 2, 2] += 2
+    long = MappedMesh(written(tmp_path / "long.ply", ends.reshape(-1, 3), np.arange(6000).reshape(-1, 3)))
+    few, more = (len(plan.Plan(mesh, 0.001, plan.FIXED + 800 * plan.OF_FIRST).first.boxes) for mesh in (short, long))
+    assert few <= 4 < more
 
 
 def test_hopelessly_little_memory_for_many_triangles_is_refused_after_few_tries(tmp_path, monkeypatch):
@@ -375,3 +397,24 @@ def test_a_run_that_goes_on_does_no_finished_step_again(tmp_path):
     done.append(("interrupted", None))
     run("nothing")
     assert not before & {title for title, _ in done}
+
+
+def test_there_are_at_most_six_rounds_and_more_memory_is_proposed(tmp_path, monkeypatch):
+    vertices, triangles = noisy()
+    mesh = MappedMesh(written(tmp_path / "a.ply", vertices, triangles))
+    planned = plan.Plan(mesh, 0.02, plan.FIXED + 2000 * plan.OF_FIRST)
+    monkeypatch.setattr("tolvol.tiles.rounds._LEAST_GAIN", -1)  # Each round is worth another.
+
+    def each(stage, title, work, jobs):
+        for job in jobs:
+            yield work(job, None)
+
+    folder = Scratch(tmp_path / "scratch", {}, resume=False)
+    found = Rounds(mesh, planned, folder, 0.02, OPTIONS, each).run()
+    assert len(found.rounds) == 6 and found.rounds[-1][0] > 1
+    (note,) = found.warnings
+    needed = int(note.partition("--memory ")[2].partition("MB")[0]) * 1_000_000
+    left = soups.write(tmp_path / "left", found.vertices[found.triangles])
+    assert len(plan.Plan(mesh, 0.02, needed).later([left], 1).boxes) == 1
+    assert f"the last round had {found.rounds[-1][0]} cells" in note
+    folder.close(discard=True)

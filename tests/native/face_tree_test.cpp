@@ -76,4 +76,38 @@ TEST(FaceTree, TouchingBoxesMeet) {
   EXPECT_EQ(found(tree, {glm::dvec3(1.5), glm::dvec3(2)}).size(), 0u);
 }
 
+TEST(FaceTree, GivesEachPairOfFacesThatMeetOnce) {
+  Team team(2);
+  Random random(5);
+  std::size_t total = 0;
+  for (const std::size_t count : {1u, 7u, 8u, 9u, 64u, 65u, 500u}) {
+    std::vector<Box> boxes;
+    while (boxes.size() < count) boxes.push_back(random_box(random));
+    FaceTree tree = tree_of(boxes, team);
+    for (const bool changed : {false, true}) {
+      if (changed) {
+        boxes[count / 2] = random_box(random), boxes[0] = Box();
+        tree.change(static_cast<std::uint32_t>(3 * (count / 2)), boxes[count / 2]);
+        tree.change(0, boxes[0]);
+      }
+      std::multiset<std::pair<std::uint32_t, std::uint32_t>> pairs, expected;
+      for (std::size_t leaf = 0; leaf < tree.leaf_count(); ++leaf) {
+        tree.for_each_pair(leaf, [&](std::uint32_t a, std::uint32_t b) {
+          pairs.insert(std::minmax(a, b));
+          return true;
+        });
+      }
+      for (std::uint32_t i = 0; i < count; ++i) {
+        for (std::uint32_t k = i + 1; k < count; ++k) {
+          if (meet(boxes[i], boxes[k])) expected.emplace(3 * i, 3 * k);
+        }
+      }
+      EXPECT_EQ(pairs, expected) << count;
+      total += pairs.size();
+    }
+  }
+  EXPECT_GT(total, 1000u);
+  EXPECT_EQ(FaceTree().leaf_count(), 0u);
+}
+
 }  // namespace

@@ -74,8 +74,23 @@ def test_progress_does_not_go_back_between_the_directions():
         seen.append(progress.fraction)
         time.sleep(0.0005)
     assert not isinstance(outcome[0], Exception)
-    assert seen == sorted(seen) and 0.4 < seen[-1] <= 1
-    assert any(0 < fraction < 0.5 for fraction in seen)
+    assert seen == sorted(seen) and 0.5 < progress.fraction <= 1
+
+
+def test_a_part_of_the_progress_ends_with_its_context():
+    progress = tolvol.Progress()
+    with pytest.raises(ZeroDivisionError), progress.part(0.25, 0.5):
+        CALLS["check"](progress)
+        assert 0.25 <= progress.fraction <= 0.5
+        raise ZeroDivisionError
+    CALLS["hausdorff"](progress)
+    assert progress.fraction > 0.5
+
+
+@pytest.mark.parametrize("ends", [(-0.1, 0.5), (0.5, 0.4), (0.5, 1.1), (float("nan"), 1), (0, float("nan"))])
+def test_a_part_of_the_progress_is_from_0_to_1(ends):
+    with pytest.raises(tolvol.InvalidInput, match="0 <= first <= last <= 1"):
+        tolvol.Progress().part(*ends)
 
 
 def test_cancel_from_another_thread():

@@ -275,7 +275,7 @@ class Command:
             if lost := count - written.extras.get(kind, 0):
                 message = f"{lost} of the {count} {kind} of IN are not in OUT"
                 whole["repairs"].append({"kind": kind, "count": lost, "message": message})
-        say("proved both ways", self.stages.end("certify"))
+        say("measured both ways", self.stages.end("certify"))
         print(f"{output.exported.name}: {solidity.line(whole['solidity']['after'])}")
         if not report.proved(whole):
             raise Stop(f"{NOT_PROVED}: {report.intervals(whole)}; {output.path} was not written", arguments.NOT_PROVED)
@@ -323,7 +323,7 @@ class Command:
         threads = self.options.threads
         # Where the file holds the result bit for bit, the measurements of the decimation are measurements of the file.
         return self.files.followed(
-            "proving", lambda progress: certify(surface, reference, tolerance, kept, threads, progress, again=False)
+            "measuring", lambda progress: certify(surface, reference, tolerance, kept, threads, progress, again=False)
         )
 
     def _draw(self, output, result, reference, tolerance, size):

@@ -56,16 +56,14 @@ def deviation(
     """
     bounds = sorted({*bounds, *([] if tolerance is None else [tolerance])})
     ways = {}
-    for way, surface, other in (("forward", a, b), ("backward", b, a)):
+    for number, (way, surface, other) in enumerate((("forward", a, b), ("backward", b, a))):
         pair = (surface.world(), surface.arrays.triangles), (other.world(), other.arrays.triangles)
-        spread = package.module.deviation(
-            *pair[0], *pair[1], bounds=bounds, percentiles=PERCENTILES, threads=threads, progress=progress
-        )
-        ways[way] = (
-            measure.largest_distance(*pair, tolerance, threads, progress, again=False),
-            spread,
-            surface.arrays.polygons,
-        )
+        with measure.part_of(progress, number / 2, (number + 1) / 2):
+            spread = package.module.deviation(
+                *pair[0], *pair[1], bounds=bounds, percentiles=PERCENTILES, threads=threads, progress=progress
+            )
+            largest = measure.largest_distance(*pair, tolerance, threads, progress, again=False)
+        ways[way] = largest, spread, surface.arrays.polygons
     facts = {name: solidity.facts(surface, threads, progress, again=False) for name, surface in (("a", a), ("b", b))}
     largest = [measured for measured, _, _ in ways.values()]
     # Both histograms have the same scale, so that they can be compared.

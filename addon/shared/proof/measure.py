@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Computes certified distances between two surfaces in the world, from the stored coordinates."""
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -87,12 +88,12 @@ def both_ways(surface, reference, tolerance=None, threads=None, progress=None, a
     """Returns two Intervals: of the surface from the reference, and of the reference from the surface."""
     own, other = _content(surface), _content(reference)
     judge = (tolerance, threads, progress, again)
-    steps = ((_key(own, other), surface, reference), (_key(other, own), reference, surface))
-    found = []
-    for number, step in enumerate(steps):
-        if progress is not None:
-            progress.show_as(number / 2, (number + 1) / 2)
-        found.append(_largest(*step, *judge))
-    if progress is not None:
-        progress.show_as(0, 1)
-    return tuple(found)
+    with part_of(progress, 0, 0.5):
+        forward = _largest(_key(own, other), surface, reference, *judge)
+    with part_of(progress, 0.5, 1):
+        return forward, _largest(_key(other, own), reference, surface, *judge)
+
+
+def part_of(progress, first, last):
+    """Returns a context within which calls show their progress as a part of the whole. progress: may be None."""
+    return contextlib.nullcontext() if progress is None else progress.part(first, last)

@@ -137,7 +137,7 @@ bool Refinement::round(std::size_t most_edges, std::size_t target, Progress* pro
     poll();
     if (progress) {
       progress->set_count(mesh_.triangle_count());
-      progress->update(0);
+      progress->poll();
     }
     if (mesh_.triangle_count() <= target) return false;
     if (!wanted(steps[place])) continue;

@@ -30,18 +30,21 @@ class Box:
         """Tells which points, (k, 3), are in the box or on one of its lower sides: each point is so in one cell alone."""
         return _all_three((points >= np.array(self.lower)) & (points < np.array(self.upper)))
 
+    def meets_boxes(self, lowest, highest):
+        """Tells which boxes meet this one. lowest, highest: the corners of the boxes, (k, 3) each."""
+        return _all_three((highest >= np.array(self.lower)) & (lowest <= np.array(self.upper)))
+
     def meets_triangles(self, corners):
         """Tells which triangles, (k, 3, 3), have a bounding box that meets this one."""
-        lowest, highest = ends(corners)
-        return _all_three((highest >= np.array(self.lower)) & (lowest <= np.array(self.upper)))
+        return self.meets_boxes(*lowest_and_highest(corners))
 
     def strictly_holds_triangles(self, corners):
         """Tells which triangles, (k, 3, 3), lie inside the box and meet none of its sides."""
-        lowest, highest = ends(corners)
+        lowest, highest = lowest_and_highest(corners)
         return _all_three((lowest > np.array(self.lower)) & (highest < np.array(self.upper)))
 
 
-def ends(corners):
+def lowest_and_highest(corners):
     """Returns the lowest and the highest coordinates of triangles, (k, 3, 3): two arrays of (k, 3)."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)  # min(1) takes three times as long.
@@ -57,7 +60,7 @@ def centroids(corners):
 
     Rounding alone would put some beside it: (x + x + x) / 3 may differ from x.
     """
-    return np.clip((corners[:, 0].astype(np.float64) + corners[:, 1] + corners[:, 2]) / 3, *ends(corners))
+    return np.clip((corners[:, 0].astype(np.float64) + corners[:, 1] + corners[:, 2]) / 3, *lowest_and_highest(corners))
 
 
 EVERYWHERE = Box((-math.inf,) * 3, (math.inf,) * 3)
@@ -113,19 +116,22 @@ class Cells:
         descend(self._root, np.arange(len(points)))
         return found
 
-    def count_near(self, points, length):
-        """Returns how many points are within a length of each cell along each axis, (count,): those that the grown box holds."""
+    def count_near(self, lowest, highest, length):
+        """Returns how many boxes are within a length of each cell along each axis, (count,): those that the grown cell meets.
+
+        lowest, highest: the corners of the boxes, (k, 3) each.
+        """
         counts = np.zeros(len(self.boxes), np.int64)
 
-        def descend(node, points):
+        def descend(node, rows):
             if isinstance(node, int):
-                counts[node] = len(points)
+                counts[node] = len(rows)
                 return
             axis, at, below, above = node
-            descend(below, points[points[:, axis] < at + length])
-            descend(above, points[points[:, axis] >= at - length])
+            descend(below, rows[lowest[rows, axis] <= at + length])
+            descend(above, rows[highest[rows, axis] >= at - length])
 
-        descend(self._root, points)
+        descend(self._root, np.arange(len(lowest)))
         return counts
 
 

@@ -7,7 +7,7 @@ in both cells may miss the same points of it. So what is to miss nothing is clip
 
 import numpy as np
 
-from .cells import ends
+from .cells import lowest_and_highest
 
 # A triangle is shallow against a side if it reaches less than this share of its longest extent across it.
 _SHALLOW = 1 / 16
@@ -40,7 +40,7 @@ def rounding(corners):
 
 def are_shallow(corners, box, margin):
     """Tells which triangles, (k, 3, 3), are shallow against a side of the box that is within `margin`, a length, of them."""
-    lower, upper = (side.astype(np.float64) for side in ends(corners))
+    lower, upper = (side.astype(np.float64) for side in lowest_and_highest(corners))
     extent = upper - lower
     flat = extent < _SHALLOW * extent.max(1, keepdims=True)
     sides = np.array([box.lower, box.upper])[:, None]

@@ -9,6 +9,7 @@ import numpy as np
 from ..shared.errors import Refused
 from ..shared.files import ply_file, stl_file
 from ..shared.files.content import require_finite, require_indices
+from .cells import lowest_and_highest
 
 EXTENSIONS = (".ply", ".stl")
 
@@ -140,9 +141,7 @@ class MappedMesh:
     def _indexed(self, rows, first):
         self._require_triangles(rows, first)
         index = rows[self._list].astype(np.int64)
-        a, b, c = index.T
-        lowest, highest = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-        require_indices(lowest, highest, len(self._vertices), 0, first)
+        require_indices(*lowest_and_highest(index), len(self._vertices), 0, first)
         corners = np.empty((len(index), 3, 3), self.dtype)
         for axis, name in enumerate("xyz"):
             corners[:, :, axis] = self._vertices[name][index]

@@ -7,16 +7,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..shared.errors import Refused
-from .cells import Box, Cells, centroids
+from .cells import Box, Cells, centroids, lowest_and_highest
 
 # What the work in a cell takes at its peak, in bytes (docs/benchmark.md): by itself; in the first round, where the mesh is the
 # reference, for each of its triangles; and in later rounds, for each triangle of the reference and for each of the mesh.
 FIXED, OF_FIRST, OF_REFERENCE, OF_MESH = 160 << 20, 1650, 700, 1600
-# As much of this may be the grid of distances, for each triangle of the reference.
-OF_GRID = 100
+# What the cells depend on besides the mesh, the tolerance and the memory.
+RECKONED = [FIXED, OF_FIRST, OF_REFERENCE, OF_MESH]
+# This share of the memory beside FIXED may be the grid of distances.
+OF_GRID = 1 / 7
 
-MOST_ROUNDS = 6
-_SAMPLES = 1 << 20  # triangles whose centroids stand for all
+_SAMPLES = 1 << 19  # triangles that stand for all
 _RUN = 1 << 10  # neighbouring triangles that are sampled together
 _FINEST = 64  # times as many cells as would do if each had the same number of triangles, and none around it
 _SMALL = 1000  # triangles of the reference in a small cell
@@ -32,7 +33,8 @@ class Plan:
 
     def __init__(self, mesh, tolerance, memory):
         self._tolerance, self._memory = tolerance, memory
-        self._reference = _Load(_samples(mesh), mesh.count, OF_FIRST)
+        corners = _samples(mesh)
+        self._points, self._reference = centroids(corners), _Load.of(corners, mesh.count, OF_FIRST)
         cells, needed = self._fewest([self._reference], 0)
         if not cells:
             raise Refused(
@@ -46,26 +48,32 @@ class Plan:
 
         There is a single cell where all of the mesh and the reference fits the memory; None if no cells fit it.
         """
-        reference = replace(self._reference, of_each=OF_REFERENCE)
+        return self._fewest(self._loads(soups), turn)[0]
+
+    def needed(self, soups):
+        """Returns the bytes with which the round after the one that has left these soups would have a single cell."""
+        return FIXED + sum(load.bytes for load in self._loads(soups))
+
+    def _loads(self, soups):
         count = sum(soup.count for soup in soups)
         step = math.ceil(max(1, count) / _SAMPLES)
-        points = np.concatenate([centroids(soup.corners()[::step]) for soup in soups])
-        return self._fewest([reference, _Load(points, count, OF_MESH)], turn)[0]
+        corners = np.concatenate([soup.corners()[::step] for soup in soups])
+        return [replace(self._reference, of_each=OF_REFERENCE), _Load.of(corners, count, OF_MESH)]
 
     def parts(self, count):
         """Returns `count` Cells for the soups of the reference."""
-        return Cells(self._reference.points, count)
+        return Cells(self._points, count)
 
     def grid_memory(self):
         """Returns the most bytes that the grid of a cell's volume may take."""
-        return max(0, (self._memory - FIXED) * OF_GRID // OF_REFERENCE)
+        return max(0, int((self._memory - FIXED) * OF_GRID))
 
     def _fewest(self, loads, turn):
-        """Returns (the fewest Cells, each of which fits, or None; the bytes that the largest of the tried ones needs)."""
+        """Returns (the fewest Cells, each of which fits, or None; the least bytes that were found to be needed)."""
         room = max(0, self._memory - FIXED)
         # Where not even FIXED is there, no cells will do, and the need of small ones is told.
         wanted, finest = (room, _FINEST) if room else (_SMALL * OF_FIRST, 1)
-        points = self._reference.points
+        points = self._points
         places = points[:: max(1, len(points) // _PLACES)]
         # No cell that holds one of these places needs less.
         needed = max(sum(load.around(place, self._tolerance) for load in loads) for place in places)
@@ -86,11 +94,17 @@ class Plan:
 
 @dataclass(frozen=True)
 class _Load:
-    """Triangles that need memory: the centroids of some of them, (k, 3), how many there are, and the bytes for each."""
+    """Triangles that need memory: the boxes of some of them, (k, 3) twice, how many there are, and the bytes for each."""
 
-    points: np.ndarray
+    lowest: np.ndarray
+    highest: np.ndarray
     count: int
     of_each: int
+
+    @classmethod
+    def of(cls, corners, count, of_each):
+        """corners: (k, 3, 3), of the triangles that stand for all."""
+        return cls(*lowest_and_highest(corners), count, of_each)
 
     @property
     def bytes(self):
@@ -98,18 +112,19 @@ class _Load:
 
     def near(self, cells, length):
         """Returns the bytes that each of the cells needs with what is within the length of it."""
-        return self._bytes_of(cells.count_near(self.points, length))
+        return self._bytes_of(cells.count_near(self.lowest, self.highest, length))
 
     def around(self, place, length):
         """Returns the bytes for what is within the length of a point."""
-        return self._bytes_of(Box(tuple(place), tuple(place)).grown(length).holds(self.points).sum())
+        box = Box(tuple(place), tuple(place)).grown(length)
+        return self._bytes_of(np.count_nonzero(box.meets_boxes(self.lowest, self.highest)))
 
-    def _bytes_of(self, points):
-        return points * (self.bytes / max(1, len(self.points)))
+    def _bytes_of(self, counts):
+        return counts * (self.bytes / max(1, len(self.lowest)))
 
 
 def _samples(mesh):
-    """Returns the centroids of triangles all over a MappedMesh, (k, 3)."""
+    """Returns the corners of triangles all over a MappedMesh, (k, 3, 3)."""
     run = min(_RUN, mesh.count)
     firsts = np.linspace(0, mesh.count - run, max(1, min(_SAMPLES, mesh.count) // run)).astype(np.int64)
-    return np.concatenate([centroids(mesh.corners(first, first + run)) for first in np.unique(firsts)])
+    return np.concatenate([mesh.corners(first, first + run) for first in np.unique(firsts)])

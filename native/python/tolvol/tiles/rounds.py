@@ -5,6 +5,9 @@ Each round refers to the reference as it is in the file. docs/architecture.md sa
 a large mesh").
 """
 
+import contextlib
+import ctypes
+import math
 from dataclasses import dataclass, replace
 from functools import reduce
 
@@ -13,10 +16,10 @@ import numpy as np
 from ..shared.proof.verdict import Interval
 from . import scratch, soups, tile
 from .cells import Box, centroids
-from .plan import MOST_ROUNDS
 from .soups import Soup
 from .tile import Tile
 
+_MOST_ROUNDS = 6
 _PARTS = 8  # soups of the reference for each cell of the first round
 # There is no further round of several cells after one that removes a smaller share of the triangles.
 _LEAST_GAIN = 0.01
@@ -67,25 +70,29 @@ class Rounds:
     def run(self):
         """Returns the Result. Raises NotWritten where the scratch folder is full, after which the run can go on."""
         reference = present = self._reference()
-        made, angles, warnings, cells = [], [0.0], {}, None
-        for number in range(MOST_ROUNDS):
-            boxes = self._cells(number, present, made)
-            if not boxes:
+        made, angles, warnings, boxes = [], [0.0], {}, None
+        for number in range(_MOST_ROUNDS):
+            wanted = self._boxes(number, present, made)
+            if not wanted:
                 break
-            cells = boxes
+            boxes = wanted
             # The first of several rounds leaves so many triangles between the cells that a thorough search is in vain.
-            options = self._options if number or len(cells) == 1 else {**self._options, "effort": "fast"}
+            options = self._options if number or len(boxes) == 1 else {**self._options, "effort": "fast"}
             like = Tile(None, present, reference, self._tolerance, options, self._plan.grid_memory())
-            done = self._steps("decimation", f"round {number + 1}", f"round{number}", decimate, like, cells)
+            done = self._steps("decimation", f"round {number + 1}", f"round{number}", decimate, like, boxes)
             before, present = present, tuple(Soup.read_from(record["soup"]) for record in done)
             if before != reference:
                 self._scratch.remove_soups(before)
             angles += [record["angle"] for record in done]
             warnings |= dict.fromkeys(text for record in done for text in record["warnings"])
-            made.append((len(cells), sum(soup.count for soup in present)))
+            made.append((len(boxes), sum(soup.count for soup in present)))
+        if len(boxes) > 1:
+            needed = math.ceil(self._plan.needed(present) / 1e6)
+            text = f"the last round had {len(boxes)} cells: with --memory {needed}MB it has one, which may leave fewer triangles"
+            warnings[text] = None
         vertices, triangles = tile.mesh_of(np.concatenate([soup.corners() for soup in present]))
         like = Tile(None, present, reference, self._tolerance, self._options)
-        measured = self._steps("certify", "proving", "measured", measure, like, cells)
+        measured = self._steps("certify", "proving", "measured", measure, like, boxes)
         forward, backward = (
             Interval(max(record[way][0] for record in measured), max(record[way][1] for record in measured))
             for way in ("forward", "backward")
@@ -114,7 +121,7 @@ class Rounds:
         self._scratch.keep("reference", {"soups": [soup.record() for soup in found]})
         return found
 
-    def _cells(self, number, present, made):
+    def _boxes(self, number, present, made):
         """Returns the boxes of the cells of a round, or None if there is no such round.
 
         They are kept, because the soups that they depend on are removed.
@@ -133,9 +140,9 @@ class Rounds:
         self._scratch.keep(f"cells{number}", {"boxes": [(box.lower, box.upper) for box in cells.boxes]})
         return cells.boxes
 
-    def _steps(self, stage, title, name, work, like, cells):
+    def _steps(self, stage, title, name, work, like, boxes):
         """Returns the records of the work in all cells, and does what has none yet."""
-        jobs = [(replace(like, cell=box), str(self._scratch.path(f"{name}_{i:05}"))) for i, box in enumerate(cells)]
+        jobs = [(replace(like, cell=box), str(self._scratch.path(f"{name}_{i:05}"))) for i, box in enumerate(boxes)]
         missing = [job for i, job in enumerate(jobs) if self._scratch.record(f"{name}_{i:05}") is None]
         for _ in self._each(stage, title, work, missing):
             pass
@@ -146,6 +153,7 @@ def decimate(job, progress=None):
     """Does the work of a round in one cell, and notes that it is done. job: (Tile, the path of its soup)."""
     one, path = job
     soup, angle, warnings = tile.decimate(one, path, progress)
+    _give_back()
     scratch.keep(path, {"soup": soup.record(), "angle": angle, "warnings": warnings})
 
 
@@ -153,4 +161,12 @@ def measure(job, progress=None):
     """Measures both distances in one cell, and notes them. job: (Tile, the path of its record)."""
     one, path = job
     forward, backward = tile.measure(one, progress)
+    _give_back()
     scratch.keep(path, {"forward": forward, "backward": backward})
+
+
+def _give_back():
+    """Gives the memory that is free in this process back to the system: glibc keeps much of it, in pieces that are too small
+    for the next cell."""
+    with contextlib.suppress(AttributeError, OSError):  # Other systems have no malloc_trim().
+        ctypes.CDLL(None).malloc_trim(0)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The scratch folder of a run, from which a run that was interrupted goes on.
 
-It holds run.json, which says what was asked, the soups, and a record for each step that is done: a JSON file that appears as a
-whole, after the soup of the step.
+It holds run.json, which says what was asked, the soups, and a record for each step that is done: a file that appears as a whole,
+after the soup of the step. A record is a line with a checksum, and JSON.
 """
 
 import contextlib
@@ -10,6 +10,7 @@ import json
 import os
 import shutil
 import uuid
+import zlib
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -77,7 +78,10 @@ class Scratch:
     def record(self, name):
         """Returns the record of a step, or None if it is not done."""
         try:
-            return json.loads(self.path(f"{name}.json").read_text())
+            checksum, _, text = self.path(f"{name}.json").read_text().partition("\n")
+            if checksum != _checksum(text):
+                raise ValueError
+            return json.loads(text)
         except FileNotFoundError:
             return None
         except (OSError, ValueError):
@@ -104,7 +108,8 @@ def keep(path, record):
     partial = Path(f"{path}.{uuid.uuid4().hex}.partial")
     try:
         with open(partial, "w") as file:
-            json.dump(record, file)
+            text = json.dumps(record)
+            file.write(f"{_checksum(text)}\n{text}")
             file.flush()
             os.fsync(file.fileno())
         os.replace(partial, f"{path}.json")
@@ -112,3 +117,7 @@ def keep(path, record):
         with contextlib.suppress(OSError):
             partial.unlink()
         raise soups.failed(error, path) from None
+
+
+def _checksum(text):
+    return f"{zlib.crc32(text.encode()):08x}"

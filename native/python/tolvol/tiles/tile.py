@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..shared import package
+from ..shared.proof.measure import part_of
 from ..welding import welded
 from . import clipping, soups
 from .cells import Box, centroids
@@ -80,32 +81,33 @@ def measure(tile, progress=None):
     lower ends are valid up to the tolerance: beyond, nothing was looked for.
     """
     threads = tile.options["threads"]
-    return (
-        _largest(tile.mesh, tile.reference, tile, threads, progress),
-        _largest(tile.reference, tile.mesh, tile, threads, progress),
-    )
+    with part_of(progress, 0, 0.5):
+        forward = _largest(tile.mesh, tile.reference, tile, threads, progress)
+    with part_of(progress, 0.5, 1):
+        return forward, _largest(tile.reference, tile.mesh, tile, threads, progress)
 
 
 def _largest(those, others, tile, threads, progress):
     corners = soups.gather(those, tile.cell)
     rounding = clipping.rounding(corners)
     box = tile.cell.grown(rounding)
-    inside = tile.cell.strictly_holds_triangles(corners)
-    whole, rest = corners[inside], corners[~inside]
+    inside = tile.cell.strictly_holds_triangles(corners)  # Clipping would give these back as they are.
+    vertices, triangles = mesh_of(corners[inside])
+    rest = corners[~inside]
+    del corners, inside  # The memory is needed.
     # Only triangles that hardly leave a side of the cell need the larger box, by which the cells together miss no point: of all
     # others, what a cell misses is near what it has. The larger box makes slivers, which take long to measure.
     shallow = clipping.are_shallow(rest, tile.cell, rounding)
-    corners = np.concatenate(
-        [whole, clipping.clipped(rest[~shallow], tile.cell), clipping.clipped(rest[shallow], box)], dtype=np.float64
-    )
+    clipped = np.concatenate([clipping.clipped(rest[~shallow], tile.cell), clipping.clipped(rest[shallow], box)])
+    vertices, triangles = _joined((vertices, triangles), mesh_of(clipped))
     rounding *= clipping.STEEP_LOSS
-    if not len(corners):
+    if not len(triangles):
         return 0.0, 0.0
     around = soups.gather(others, box.grown(tile.tolerance))
     if not len(around):
         return tile.tolerance, np.inf
     found = package.module.directed_hausdorff(
-        *mesh_of(corners), *mesh_of(around), bound=tile.tolerance, threads=threads, progress=progress
+        vertices, triangles, *mesh_of(around), bound=tile.tolerance, threads=threads, progress=progress
     )
     return max(found.lower - rounding, 0.0), found.upper + rounding
 
@@ -114,6 +116,12 @@ def mesh_of(corners):
     """Returns (vertices, triangles) of a soup, with one vertex at each position."""
     vertices, number = welded(corners.reshape(-1, 3))
     return vertices, number.reshape(-1, 3)
+
+
+def _joined(one, other):
+    """Returns (vertices, triangles) of two meshes together, whose vertices stay apart, as float64."""
+    vertices = np.concatenate([one[0], other[0]], dtype=np.float64)
+    return vertices, np.concatenate([one[1], other[1] + len(one[0])], dtype=np.int32)
 
 
 def _has_area(vertices, triangles):
