@@ -53,7 +53,8 @@ class _GoOn:
         self._run, _handed_over = _handed_over, None
         self._run.voice = self
         self._run.before_writing = functools.partial(_rewind, self._run)
-        return self._run.begin_modal(context, self)
+        context.window_manager.modal_handler_add(self)
+        return self._run.begin_modal(context)
 
     def modal(self, context, event):
         return self._run.on_event(context, event)

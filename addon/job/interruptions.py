@@ -9,6 +9,7 @@ from . import refusals
 # Only the main thread uses these.
 runs = []  # each a Run (see run.py); more than one only until the next event, after Adjust Last Operation
 to_say = []  # messages for the status bar, to be shown once the next file is open
+_undone = 0  # how many steps were undone or redone
 _edited = False  # whether Blender has reported a change of a run's mesh since the last call of take_edited()
 
 
@@ -24,6 +25,11 @@ def take_edited():
     return edited
 
 
+def undone():
+    """Returns how many steps were undone or redone in this session."""
+    return _undone
+
+
 def _interrupt(happens):
     for run in runs:
         run.interrupt(happens)
@@ -37,11 +43,15 @@ def _before_load(*_):
 
 @persistent
 def _before_undo(*_):
+    global _undone
+    _undone += 1
     _interrupt("a step was undone")
 
 
 @persistent
 def _before_redo(*_):
+    global _undone
+    _undone += 1
     _interrupt("a step was redone")
 
 

@@ -2,17 +2,18 @@
 """The base class of operators that work in threads."""
 
 import json
+import time
 
 import bpy
 from bpy.props import StringProperty
 
 from .. import native, status_bar
 from ..shared.errors import Refused
-from . import adjusting, run
-from .interruptions import runs, under_way
+from . import adjusting, progress_text, run
+from .interruptions import runs, under_way, undone
 
-# Blender draws nothing while a run takes its objects' meshes. For as many faces as this that takes 0.05 to 0.1 s: the status
-# bar shows that the operator has begun before it does.
+# Blender draws nothing while a run takes its objects' meshes, which takes 0.05 to 0.1 s for this many faces together. For as many
+# or more, the operator first shows in the status bar that it has begun.
 LARGE = 100_000
 
 _SOON = 0.02  # seconds, in which Blender draws the status bar
@@ -39,7 +40,7 @@ class JobOperator:
     part = ""  # which part of the work is under way, such as "Level 2 of 3", if there are several
 
     _run = None
-    _timer = None  # while the status bar shows that the operator has begun, and its run has not
+    _waiting = None  # a _Waiting before the run of an operator on large meshes begins, and None afterwards
 
     def targets(self, context):
         """Returns the objects that the operator works on. The settings are those of the first one."""
@@ -119,10 +120,11 @@ class JobOperator:
         if self._has_to_wait():
             return {"CANCELLED"}
         if sum(len(ob.data.polygons) for ob in self.targets(context)) < LARGE:
-            return self._start(context, self)
-        self._timer = context.window_manager.event_timer_add(_SOON, window=context.window)
+            self._begin(context)
+            return self._run.advance() or self._run.go_on(run.PATIENCE) or self._become_modal(context)
+        self._waiting = _Waiting(context, self._asked(context))
+        status_bar.show(progress_text.status_line(progress_text.preparing(self.bl_label)))
         context.window_manager.modal_handler_add(self)
-        status_bar.show(f"{self.bl_label}: Preparing    Esc: Cancel")
         return {"RUNNING_MODAL"}
 
     def _has_to_wait(self):
@@ -132,34 +134,49 @@ class JobOperator:
             self.report({"WARNING"}, f"{other.label} is at work: wait until it ends, or press Esc")
         return other is not None
 
-    def _start(self, context, modal):
-        """Begins the run. modal: what shall receive Blender's events, or None if that is so already."""
-        self._begin(context)
-        return self._run.advance() or self._run.go_on(run.PATIENCE) or self._run.begin_modal(context, modal)
+    def _asked(self, context):
+        """Returns a value that is another one once the operator would work on something else."""
+        meshes = [(ob.name, ob.data.as_pointer(), len(ob.data.vertices)) for ob in self.targets(context)]
+        return context.mode, undone(), meshes
+
+    def _become_modal(self, context):
+        context.window_manager.modal_handler_add(self)
+        return self._run.begin_modal(context)
 
     def modal(self, context, event):
-        if self._timer is None:
+        if self._waiting is None:
             return self._run.on_event(context, event)
-        if event.type not in {"TIMER", "ESC"}:
+        if not self._waiting.is_ended_by(event):
             return {"PASS_THROUGH"}
-        self._end_timer(context)
+        waiting, self._waiting = self._waiting, None
+        waiting.end(context)
+        ended = {"CANCELLED"}
+        try:
+            ended = self._after_waiting(context, event, waiting)
+        finally:
+            if ended != {"RUNNING_MODAL"}:
+                status_bar.clear()
+        return ended
+
+    def _after_waiting(self, context, event, waiting):
         if event.type == "ESC":
             self.report({"INFO"}, f"{self.bl_label} was cancelled. It has changed nothing")
             return {"CANCELLED"}
-        if not self.poll(context):
-            self.report({"WARNING"}, f"{self.bl_label} was stopped, because the selection or the mode has changed")
+        if self._has_to_wait():
             return {"CANCELLED"}
-        return {"CANCELLED"} if self._has_to_wait() else self._start(context, None)
-
-    def _end_timer(self, context):
-        context.window_manager.event_timer_remove(self._timer)
-        self._timer = None
-        status_bar.clear()
+        if not self.poll(context) or self._asked(context) != waiting.asked:
+            self.report(
+                {"WARNING"}, f"{self.bl_label} did not begin, because something has changed since it was pressed"
+            )
+            return {"CANCELLED"}
+        self._begin(context)
+        return self._run.advance() or self._run.go_on(run.PATIENCE) or self._run.begin_modal(context)
 
     def cancel(self, context):
         """Called when Blender closes the window or the file, or a dialog of the operator before its job has begun."""
-        if self._timer is not None:
-            self._end_timer(context)
+        if self._waiting is not None:
+            self._waiting.end(context)
+            status_bar.clear()
         if self._run is not None:
             self._run.close(context)
 
@@ -170,3 +187,20 @@ class JobOperator:
         self.worked_on = json.dumps([ob.name for ob in self.objects])
         self.doing, self.share, self.count, self.part = "", 0.0, "", ""
         self._run = run.Run(self, context)
+
+
+class _Waiting:
+    """The time in which Blender draws the status bar before the run of an operator begins."""
+
+    def __init__(self, context, asked):
+        self.asked = asked
+        self._timer = context.window_manager.event_timer_add(_SOON, window=context.window)
+        self._ends_at = time.monotonic() + _SOON  # Other timers send the same events.
+
+    def is_ended_by(self, event):
+        if event.type == "ESC":
+            return event.value == "PRESS"
+        return event.type == "TIMER" and time.monotonic() >= self._ends_at
+
+    def end(self, context):
+        context.window_manager.event_timer_remove(self._timer)

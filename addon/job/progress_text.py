@@ -62,6 +62,11 @@ def tell(operator, progress, clock):
     )
 
 
+def preparing(title):
+    """Returns the Told of an operator that has not read its meshes yet."""
+    return Told(title, "", "Preparing", None, "", "", "Cancel")
+
+
 def stopping(title, part=""):
     """Returns the Told of an operator that is about to end."""
     return Told(title, part, "Stopping", None, "", "", "")

@@ -125,15 +125,9 @@ class Run:
                 return ended
         return None
 
-    def begin_modal(self, context, modal):
-        """Makes `modal`, an operator, receive Blender's events from now on, unless it is None, because it does so already.
-
-        It passes them to on_event().
-        """
-        manager = context.window_manager
-        self._timer = manager.event_timer_add(_TICK, window=context.window)
-        if modal is not None:
-            manager.modal_handler_add(modal)
+    def begin_modal(self, context):
+        """Goes on by the events that an operator, which is or becomes modal, passes to on_event() from now on."""
+        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
         interruptions.runs.append(self)
         context.view_layer.update()  # What has changed before is no other change.
         self.something_else = False

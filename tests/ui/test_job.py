@@ -83,7 +83,7 @@ def test_that_an_operator_has_begun_is_shown_before_a_large_mesh_is_read():
     before, reference, percent = stored(), world_triangles(suzanne()), suzanne().tolvol.tolerance_percent
     with mock.patch.object(status_bar, "show", wraps=status_bar.show) as show:
         begin_large(0.02)
-        assert [call.args for call in show.call_args_list] == [("Decimate in Tolerance: Preparing    Esc: Cancel",)]
+        assert [call.args for call in show.call_args_list] == [("Preparing    Esc: Cancel",)]
     yield from finished(lambda: suzanne().tolvol.snapshot is not None and not job.under_way())
     assert_proved(suzanne(), reference, percent)
     xdotool("mousemove", *centre())
@@ -106,13 +106,46 @@ def test_esc_before_a_large_mesh_is_read_cancels_the_operator():
     assert suzanne().tolvol.snapshot is None
 
 
-def test_an_operator_that_cannot_work_any_more_when_a_large_mesh_would_be_read_says_so():
+def test_an_operator_does_not_begin_on_something_else_than_what_it_was_asked_for():
+    def activate(other):
+        bpy.context.view_layer.objects.active = other
+
+    changes = (
+        lambda other: activate(None),
+        activate,
+        lambda other: other.select_set(True),
+        lambda other: bpy.ops.ed.undo(),
+    )
+    for change in changes:
+        yield from reset(monkey)
+        bpy.ops.mesh.primitive_cube_add(location=(0, 4, 0))
+        other = bpy.context.object
+        bpy.context.view_layer.objects.active = suzanne()
+        other.select_set(False)
+        with window_context():
+            bpy.ops.ed.undo_push(message="ready")
+            suzanne().data.vertices[0].co.x += 0.1
+            bpy.ops.ed.undo_push(message="moved")
+        said = len(reports())
+        begin_large(0.2)
+        with window_context():
+            change(other)
+        yield from finished(lambda said=said: len(reports()) > said)
+        yield from ends(said, "Decimate in Tolerance did not begin, because something has changed since it was pressed")
+        assert suzanne().tolvol.snapshot is None and not status_bar._given
+
+
+def test_another_operator_that_has_begun_meanwhile_is_not_disturbed():
     yield from reset(monkey)
-    said = len(reports())
-    begin_large(0.2)
-    bpy.context.view_layer.objects.active = None
+    begin_large(0.5)
+    said = begin()
     yield from finished(lambda: len(reports()) > said)
-    yield from ends(said, "Decimate in Tolerance was stopped, because the selection or the mode has changed")
+    assert "Decimate in Tolerance is at work: wait until it ends, or press Esc" in reports()[-1]
+    assert job.under_way()
+    xdotool("mousemove", *centre())
+    yield
+    xdotool("key", "Escape")
+    yield from ends(said, "Decimate in Tolerance was cancelled")
 
 
 def rotation():

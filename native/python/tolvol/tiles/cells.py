@@ -69,24 +69,26 @@ EVERYWHERE = Box((-math.inf,) * 3, (math.inf,) * 3)
 class Cells:
     """`count` cells that hold about as many of some points, (k, 3), each; fewer where many points lie on each other.
 
-    Each cut is across a long axis of the points. `turn` chooses the axis, and how many of the cells are below the cut, so that
-    the sides of the cells of several turns lie apart. O(k log count).
+    Each cut is across a long axis of the points. `turn` chooses the axis, and how many of the cells are below the cut. In every
+    second turn there is a cell more, and the first cut is half a cell away from where it would be. So the sides of the cells
+    of one turn lie apart from those of the next. O(k log count).
     """
 
     def __init__(self, points, count, turn=0):
         self.boxes = []
-        self._root = self._cut(points.astype(np.float64), count, turn, EVERYWHERE)
+        self._root = self._cut(points.astype(np.float64), count, turn, EVERYWHERE, turn % 2)
 
-    def _cut(self, points, count, turn, box):
+    def _cut(self, points, count, turn, box, is_shifted=False):
         """Returns (axis, at, the node below, the node above), or the number of a cell."""
         if count > 1 and len(points) > 1:
             axis = _axis(points.max(0) - points.min(0), turn)
+            count, half = (count + 1, 0.5) if is_shifted else (count, 0)
             below = min(max(round(_SHARES[turn % len(_SHARES)] * count), 1), count - 1)
             values = points[:, axis]
             # Points at the cut are above it. Where the lowest point is there, the cut goes to the next coordinate.
             above = values[values > values.min()]
             if len(above):
-                rank = len(values) * below // count
+                rank = int(len(values) * (below - half) / (count - 2 * half))
                 at = float(max(np.partition(values, rank)[rank], above.min()))
                 is_below = points[:, axis] < at
                 lower = Box(box.lower, _with(box.upper, axis, at))
