@@ -90,7 +90,7 @@ class Writing:
         self._carry.write(mesh, self.layout)
         stored = column(mesh.vertices, "co", 3)[self.layout.result_vertices]
         if not np.array_equal(stored.view(np.uint32), self._result.vertices.view(np.uint32)):
-            raise RuntimeError("the mesh that was written is not the one that was certified")
+            raise RuntimeError("the mesh that was written is not the one that was proved")
 
 
 class Layout:

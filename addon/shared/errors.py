@@ -13,7 +13,7 @@ class Refused(Exception):
 
 
 class NotProved(Refused):
-    """The result could not be certified to be within the tolerance. The operator has changed nothing."""
+    """The result could not be proved to be within the tolerance. The operator has changed nothing."""
 
     def __init__(self, intervals):
         super().__init__(f"{NOT_PROVED}: {intervals}")

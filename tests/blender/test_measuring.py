@@ -5,10 +5,12 @@ import time
 
 import bmesh
 import bpy
+import numpy as np
 import pytest
 
-from addon import measuring
+from addon import measuring, native
 from addon.background import queue
+from addon.mesh import mesh_io
 from addon.panels import deviation
 from addon.proof import statistics, verdict
 from addon.proof.verdict import FAIL, NOT_CHECKED, PASS
@@ -90,6 +92,27 @@ def test_what_check_has_measured_is_known_in_edit_mode_without_another_measureme
     measuring.note(ob)
     measured()
     assert len(asked) == 2, "it was measured with another tolerance"
+
+
+def test_the_progress_of_both_directions_is_that_of_one_measurement(monkeypatch):
+    arrays = mesh_io.read_mesh(sheet(count=20, bumps=0.1).data)
+    surface, other = ((arrays.vertices * scale, arrays.triangles) for scale in (np.float32(1), np.float32(1.1)))
+    progress, seen = native.module.Progress(), []
+    measured_way = native.module.directed_hausdorff
+
+    def noted(*given, **options):
+        found = measured_way(*given, **options)
+        seen.append(progress.fraction)
+        return found
+
+    monkeypatch.setattr(native.module, "directed_hausdorff", noted)
+    measure.both_ways(surface, other, progress=progress)
+    assert 0 < seen[0] <= 0.5 < seen[1] <= 1
+    monkeypatch.setattr(native.module, "directed_hausdorff", lambda *given, **options: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        measure.both_ways(surface, other, progress=progress)
+    measured_way(*surface, *other, progress=progress)
+    assert progress.fraction > 0.5, "the part has ended"
 
 
 def test_a_change_of_the_mesh_tolerance_or_reference_counts():

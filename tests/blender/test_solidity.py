@@ -227,6 +227,13 @@ def test_more_pairs_than_are_counted_are_at_least_so_many(monkeypatch, capfd):
     assert int(said[1]) == mesh_io.column(ob.data.polygons, "select", 1, bool).sum() > 0
 
 
+def test_a_motion_with_more_crossing_pairs_than_are_counted_is_refused(monkeypatch, capfd):
+    monkeypatch.setattr(solidity, "MOST_PAIRS", 10)
+    facts(CUBE, moved(CUBE, [0.5, 0.4, 0.3]))
+    with pytest.raises(RuntimeError, match="at least 10 pairs of faces cross, too many to keep others out"):
+        bpy.ops.tolvol.smooth(iterations=3)
+
+
 # After every operation ------------------------------------------------------------------------------------------------
 
 

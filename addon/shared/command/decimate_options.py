@@ -5,8 +5,8 @@ from ..decimation import FEWEST_LEVELS, MOST_LEVELS
 from .arguments import above_zero, angle, file_name, length, several, whole_number
 
 DESCRIPTION = """\
-Reduces the triangles of the meshes of IN within the tolerance and writes the meshes to OUT. The written file is read back and
-proved before it is moved to OUT."""
+Reduces the triangles of the meshes of IN within the tolerance and writes the meshes to OUT. The written file is read back, and
+proved to be within the tolerance, before it is moved to OUT."""
 
 EPILOG = """\
 The last line of the output gives the result. Its percentages are of the size of the reference (the longest diagonal of the
