@@ -25,7 +25,7 @@ def take_edited():
     return edited
 
 
-def undone():
+def undo_count():
     """Returns how many steps were undone or redone in this session."""
     return _undone
 

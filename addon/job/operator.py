@@ -10,7 +10,7 @@ from bpy.props import StringProperty
 from .. import native, status_bar
 from ..shared.errors import Refused
 from . import adjusting, progress_text, run
-from .interruptions import runs, under_way, undone
+from .interruptions import runs, under_way, undo_count
 
 # Blender draws nothing while a run takes its objects' meshes, which takes 0.05 to 0.1 s for this many faces together. For as many
 # or more, the operator first shows in the status bar that it has begun.
@@ -135,9 +135,10 @@ class JobOperator:
         return other is not None
 
     def _asked(self, context):
-        """Returns a value that is another one once the operator would work on something else."""
+        """Returns a value that changes where other objects, another mode or another number of vertices would be worked on, or a
+        step was undone."""
         meshes = [(ob.name, ob.data.as_pointer(), len(ob.data.vertices)) for ob in self.targets(context)]
-        return context.mode, undone(), meshes
+        return context.mode, undo_count(), meshes
 
     def _become_modal(self, context):
         context.window_manager.modal_handler_add(self)
@@ -154,7 +155,7 @@ class JobOperator:
         try:
             ended = self._after_waiting(context, event, waiting)
         finally:
-            if ended != {"RUNNING_MODAL"}:
+            if not runs:  # A run clears its own line.
                 status_bar.clear()
         return ended
 

@@ -13,14 +13,14 @@ class Clock:
 
     def __init__(self):
         self._stage = None
-        self._began = 0.0
+        self._began, self._first = 0.0, 0.0  # when the stage began, and at which share
 
     def seconds_left(self, stage, share):
         """Returns the seconds, or None as long as too little of the stage is done. share: of the stage that is done."""
         if stage != self._stage or share == 0:
-            self._stage, self._began = stage, time.monotonic()
-        took = time.monotonic() - self._began
-        return took * (1 - share) / share if took >= _KNOWN_AFTER and share >= _KNOWN_SHARE else None
+            self._stage, self._began, self._first = stage, time.monotonic(), share
+        took, done = time.monotonic() - self._began, share - self._first
+        return took * (1 - share) / done if took >= _KNOWN_AFTER and done >= _KNOWN_SHARE else None
 
 
 @dataclass(frozen=True)

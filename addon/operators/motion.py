@@ -12,7 +12,7 @@ from ..mesh import mesh_io
 from ..proof import last_run
 from ..reference import measurements, snapshots, tolerances
 from ..shared import volumes
-from ..shared.errors import NotProved
+from ..shared.errors import NotProved, Refused
 from ..shared.proof import report, solidity
 from ..shared.proof.certify import certify
 from ..shared.proof.verdict import Interval, Verdict
@@ -88,7 +88,7 @@ class Motion:
         """Returns the result of certify() for the moved mesh, and "solidity", the result of solidity.compared().
 
         Raises NotProved unless the mesh is within the tolerance and, where crossings are kept out, no polygons cross that did
-        not cross before.
+        not cross before. Raises Refused where too many cross to tell.
         """
         moved = Surface(replace(self.surface.arrays, vertices=vertices, triangles=triangles), self.surface.matrix)
         certified = certify(moved, self.reference, self.tolerance, 0, self.threads, progress)
@@ -101,16 +101,16 @@ class Motion:
         if self._facts_before is None:
             self._facts_before = solidity.facts(self.surface, self.threads, progress)
         if self.crossings == "keep_out" and not facts["uncrossed"]:
-            new = self._crossing(moved, progress) - self._crossing(self.surface, progress)
-            if new:
+            before = self._crossing(self.surface, progress)
+            if new := self._crossing(moved, progress) - before:
                 raise NotProved(f"{len(new):,} pairs of faces would cross that do not cross now")
         return certified | {"solidity": solidity.compared(self._facts_before, facts)}
 
     def _crossing(self, surface, progress):
-        """Returns the pairs of polygons of which triangles cross as a set. Raises NotProved for solidity.MOST_PAIRS or more."""
+        """Returns the pairs of polygons of which triangles cross as a set. Raises Refused for solidity.MOST_PAIRS or more."""
         found = solidity.crossing_pairs(surface.arrays, self.threads, progress)
         if len(found) >= solidity.MOST_PAIRS:
-            raise NotProved(f"{solidity.pair_count(len(found))} pairs of faces cross, too many to keep others out")
+            raise Refused(f"{solidity.pair_count(len(found))} pairs of faces cross, too many to keep others out")
         polygons = surface.arrays.polygons[found]
         return set(map(tuple, np.sort(polygons, axis=1).tolist()))
 

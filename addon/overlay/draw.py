@@ -89,20 +89,22 @@ def surfaces(context, shown):
     drawn, _ = _drawn(context, shown)
     if not drawn:
         return
-    gpu.state.depth_test_set("LESS_EQUAL")
     # NEARER may let two layers pass the depth test at one pixel. Writing depths makes the nearer layer visible.
     gpu.state.depth_mask_set(True)
     references = [ob for ob in drawn if coloured.is_reference(ob)]
-    for ob in drawn.keys() - set(references):
-        _draw(context, ob, drawn[ob])
-    if references:
-        # The mesh, which lies about where the reference is, would cover parts of it: references are drawn over everything.
-        gpu.state.active_framebuffer_get().clear(depth=1.0)
-    for ob in references:
-        _draw(context, ob, drawn[ob])
-    gpu.state.blend_set("NONE")
-    gpu.state.depth_mask_set(False)
-    gpu.state.depth_test_set("NONE")
+    try:
+        for ob in drawn.keys() - set(references):
+            _draw(context, ob, drawn[ob])
+        if references:
+            # The mesh, which lies about where the reference is, would cover parts of it: references are drawn over
+            # everything.
+            gpu.state.active_framebuffer_get().clear(depth=1.0)
+        for ob in references:
+            _draw(context, ob, drawn[ob])
+    finally:
+        gpu.state.blend_set("NONE")
+        gpu.state.depth_mask_set(False)
+        gpu.state.depth_test_set("NONE")
 
 
 def _draw(context, ob, drawn):
@@ -118,8 +120,10 @@ def _draw(context, ob, drawn):
         _STRIPE * context.preferences.system.ui_scale,
         ob.tolvol.deviation_opacity * (shading.xray_alpha if x_ray else 1),
     )
-    buffer = geometry_buffer.of_size(*gpu.state.viewport_get()[2:])
+    buffer = geometry_buffer.of_size(gpu.state.viewport_get()[2:])
     _fill(buffer, drawn, told)
+    gpu.state.depth_test_set("LESS_EQUAL")
+    gpu.state.blend_set("ALPHA")
     shader = shaders.surface()
     shader.bind()
     shader.uniform_sampler("colours", buffer.colours)
@@ -148,20 +152,20 @@ def _fill(buffer, drawn, told):
     gpu.state.blend_set("NONE")
     with buffer.of_places.bind():
         buffer.of_places.clear(color=(0, 0, 0, 0), depth=1)
+        gpu.state.depth_test_set("LESS_EQUAL")
         shader = shaders.geometry()
         shader.bind()
         shader.uniform_block("told", told)
         what.triangles.draw(shader, what.to_frame)
+    gpu.state.depth_test_set("NONE")
     with buffer.of_colours.bind():
         shader = shaders.colours()
         shader.bind()
         shader.uniform_sampler("transfer", shaders.transfer(drawn.scale.signed, drawn.palette))
         shader.uniform_sampler("places", buffer.places)
-        shader.uniform_sampler("lights", buffer.light)
         what.field.bind(shader)
         shader.uniform_block("told", told)
         square.unit().draw(shader)
-    gpu.state.blend_set("ALPHA")
 
 
 def _eye(view, world_to_frame):

@@ -2,38 +2,52 @@
 """Keeps the geometry buffers of the views: textures into which a surface is drawn before its pixels are coloured.
 
 The distance of a place takes long to find. For a triangle that is smaller than a pixel the GPU would find it for a whole block of
-pixels, and keep one of them. So the triangles are drawn without distances, and then each pixel gets its colour once. At last the
-triangles are drawn with these colours, where Blender's depths show them. This is deferred shading [M. Deering et al., "The
-Triangle Processor and Normal Vector Shader", 1988].
+pixels, and keep one of them. So the triangles of an object are drawn without distances, and then each of its pixels gets its
+colour once. At last the triangles are drawn with these colours, where Blender's depths show them. This is deferred shading
+[M. Deering et al., "The Triangle Processor and Normal Vector Shader", 1988].
 """
 
-import functools
 from dataclasses import dataclass
 
+import bpy
 import gpu
+
+_buffers = {}  # (width, height) -> GeometryBuffer
 
 
 @dataclass(frozen=True)
 class GeometryBuffer:
-    """Holds for each pixel of a view the place on the surface (`places`), its brightness (`light`), which is 0 where there is no
-    surface, and its colour (`colours`)."""
+    """Holds for each pixel of a view the place on the surface with its brightness, which is 0 where there is no surface
+    (`places`), and its colour (`colours`). 28 bytes a pixel."""
 
     places: gpu.types.GPUTexture
-    light: gpu.types.GPUTexture
     depths: gpu.types.GPUTexture  # A framebuffer does not keep its textures.
     colours: gpu.types.GPUTexture
     of_places: gpu.types.GPUFrameBuffer
     of_colours: gpu.types.GPUFrameBuffer
 
 
-@functools.lru_cache(maxsize=4)  # Few views have different sizes at once.
-def of_size(width, height):
-    """Returns the GeometryBuffer of views of this size. It may be called only while a 3D view is drawn."""
-    formats = "RGBA32F", "R16F", "DEPTH_COMPONENT32F", "RGBA16F"
-    places, light, depths, colours = (gpu.types.GPUTexture((width, height), format=name) for name in formats)
-    of_places = gpu.types.GPUFrameBuffer(depth_slot=depths, color_slots=(places, light))
-    return GeometryBuffer(places, light, depths, colours, of_places, gpu.types.GPUFrameBuffer(color_slots=(colours,)))
+def of_size(size):
+    """Returns the GeometryBuffer of views of this size, (width, height). It may be called only while a 3D view is drawn."""
+    if size not in _buffers:
+        for other in _buffers.keys() - _sizes_of_views():
+            del _buffers[other]
+        formats = "RGBA32F", "DEPTH_COMPONENT32F", "RGBA16F"
+        places, depths, colours = (gpu.types.GPUTexture(size, format=name) for name in formats)
+        of_places, of_colours = (
+            gpu.types.GPUFrameBuffer(depth_slot=depths, color_slots=(places,)),
+            gpu.types.GPUFrameBuffer(color_slots=(colours,)),
+        )
+        _buffers[size] = GeometryBuffer(places, depths, colours, of_places, of_colours)
+    return _buffers[size]
+
+
+def _sizes_of_views():
+    areas = (area for window in bpy.context.window_manager.windows for area in window.screen.areas)
+    regions = (region for area in areas if area.type == "VIEW_3D" for region in area.regions)
+    return {(region.width, region.height) for region in regions if region.type == "WINDOW"}
 
 
 def free():
-    of_size.cache_clear()
+    """Frees all textures. It may be called at any time."""
+    _buffers.clear()

@@ -53,8 +53,7 @@ float banded(float part, float lowest, float bands) {
 _GEOMETRY_FRAGMENT = """
 void main() {
   vec3 normal = cross(dFdx(place), dFdy(place));
-  seen = vec4(place, 1.0);
-  light = head_light(normal, normalize(told.eye.xyz - told.eye.w * place));
+  shown = vec4(place, head_light(normal, normalize(told.eye.xyz - told.eye.w * place)));
 }
 """
 
@@ -68,8 +67,8 @@ void main() {
 _COLOURS_FRAGMENT = """
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  float light = texelFetch(lights, pixel, 0).r;
-  if (light == 0.0) {
+  vec4 lit = texelFetch(places, pixel, 0);
+  if (lit.w == 0.0) {
     shown = vec4(0.0);
     return;
   }
@@ -77,9 +76,8 @@ void main() {
   // farther if what is beyond has colours.
   float far = told.range > 1.0 ? FAR * told.range : 1.0;
   float reach = 1.001 * far * told.tolerance + 2.0 * ROUNDING;
-  vec3 place = texelFetch(places, pixel, 0).xyz;
-  float d = surface_distance(nodes, corners, int(told.leaves), place, reach, ROUNDING) / told.tolerance;
-  vec3 colour = light * distance_colour(transfer, banded(d / told.range, told.lowest, told.bands), told.lowest);
+  float d = surface_distance(nodes, corners, int(told.leaves), lit.xyz, reach, ROUNDING) / told.tolerance;
+  vec3 colour = lit.w * distance_colour(transfer, banded(d / told.range, told.lowest, told.bands), told.lowest);
   if (abs(d) > far) {
     colour = outside_colour(gl_FragCoord.xy, told.period, OUTSIDE, STRIPE);
   } else if (abs(d) > 1.0) {
@@ -139,20 +137,16 @@ ROW = 2048
 FLAT, BAR, STRIPES = 0.0, 1.0, 2.0
 
 
-# What a fragment shader writes, if nothing else is said.
-_WRITTEN = (("VEC4", "shown"),)
-
 # The attributes of a vertex: local, and in the frame of the tree.
 _VERTEX = [("VEC3", "position"), ("VEC3", "framed")]
 
 
-def _info(varying, attributes, vertex, fragment, shared=(), written=_WRITTEN):
+def _info(varying, attributes, vertex, fragment, shared=()):
     """Returns a GPUShaderCreateInfo.
 
     varying: (type, name) of the value that the vertex shader passes to the fragment shader.
     attributes: (type, name) of each attribute that the vertex shader reads.
     shared: files in shaders/ whose functions the fragment shader uses.
-    written: (type, name) of what the fragment shader writes.
     """
     interface = gpu.types.GPUStageInterfaceInfo(f"tolvol_{varying[1]}")
     interface.smooth(*varying)
@@ -160,8 +154,7 @@ def _info(varying, attributes, vertex, fragment, shared=(), written=_WRITTEN):
     for i, attribute in enumerate(attributes):
         info.vertex_in(i, *attribute)
     info.vertex_out(interface)
-    for i, value in enumerate(written):
-        info.fragment_out(i, *value)
+    info.fragment_out(0, "VEC4", "shown")
     info.push_constant("BOOL", "srgbTarget")
     info.define("ROUNDED", "2.4e-7")  # four times 2^-24, the rounding of float32
     for name, colour in zip(("OUTSIDE", "STRIPE"), native.module.OUTSIDE_COLOURS):
@@ -172,9 +165,9 @@ def _info(varying, attributes, vertex, fragment, shared=(), written=_WRITTEN):
     return info
 
 
-def _of_surface(fragment, shared=(), written=_WRITTEN):
+def _of_surface(fragment, shared=()):
     """Returns the GPUShaderCreateInfo of a shader that draws the triangles of a surface."""
-    info = _info(("VEC3", "place"), _VERTEX, _SURFACE_VERTEX, fragment, shared, written)
+    info = _info(("VEC3", "place"), _VERTEX, _SURFACE_VERTEX, fragment, shared)
     _add_told(info)
     info.define("NEARER", "1e-6")
     return info
@@ -188,21 +181,20 @@ def _add_told(info):
 
 @functools.cache
 def geometry():
-    """Returns the shader that draws the triangles of a surface into the places and the light of a geometry buffer."""
-    written = ("VEC4", "seen"), ("FLOAT", "light")
-    return gpu.shader.create_from_info(_of_surface(_GEOMETRY_FRAGMENT, ("distance_colour.glsl",), written))
+    """Returns the shader that draws the triangles of a surface into the places of a geometry buffer."""
+    return gpu.shader.create_from_info(_of_surface(_GEOMETRY_FRAGMENT, ("distance_colour.glsl",)))
 
 
 @functools.cache
 def colours():
     """Returns the shader that fills the colours of a geometry buffer by the distances of its places from a tree.
 
-    The samplers `nodes` and `corners` are the textures of the tree, `places` and `lights` those of the geometry buffer.
+    The samplers `nodes` and `corners` are the textures of the tree, and `places` is that of the geometry buffer.
     """
     shared = "surface_distance.glsl", "distance_colour.glsl"
     info = _info(("VEC2", "part"), [("VEC2", "position")], _VIEW_VERTEX, _COLOURS_FRAGMENT, shared)
     info.sampler(0, "FLOAT_1D", "transfer")
-    for i, name in enumerate(("nodes", "corners", "places", "lights")):
+    for i, name in enumerate(("nodes", "corners", "places")):
         info.sampler(1 + i, "FLOAT_2D", name)
     _add_told(info)
     info.define("ROW", str(ROW))

@@ -17,4 +17,5 @@ def unit():
 
 
 def free():
+    """Frees the square on the GPU."""
     unit.cache_clear()

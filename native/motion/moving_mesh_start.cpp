@@ -18,8 +18,9 @@
 namespace tolvol {
 namespace {
 
-/// The shares of the stage "checking" at which all faces are certified, and those that fail are compared.
-constexpr double kCertified = 0.6, kCompared = 0.8;
+/// The shares of the stage "checking" at which all faces are certified, and at which a search has decided about those
+/// that fail. The rest is for the sides and angles of faces.
+constexpr double kCertified = 0.6, kSearched = 0.8;
 
 }  // namespace
 
@@ -115,7 +116,7 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, double m
   std::vector<std::uint32_t> failing = take_uncertified(open, progress);
   std::vector<std::uint8_t> outside(failing.size());
   {
-    const Progress::Part part(progress, kCertified, kCompared);
+    const Progress::Part part(progress, kCertified, kSearched);
     parallel_for(failing.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
       if (progress) progress->update(static_cast<double>(begin) / static_cast<double>(failing.size()));
       for (std::size_t i = begin; i < end; ++i) outside[i] = !is_inside(failing[i]);
@@ -130,7 +131,7 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, double m
   std::erase_if(failing, [&](std::uint32_t f) { return std::ranges::binary_search(result.outside, f); });
   failing = compare_sides(std::move(failing), progress);
   std::vector<std::uint8_t> exceeds(failing.size());
-  const Progress::Part part(progress, kCompared, 1);
+  const Progress::Part part(progress, kSearched, 1);
   parallel_for(failing.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(static_cast<double>(begin) / static_cast<double>(failing.size()));
     for (std::size_t i = begin; i < end; ++i) exceeds[i] = limit_angle(failing[i]);

@@ -47,9 +47,10 @@ some calls that are steps of one.)doc")
             return std::make_unique<PartOf>(&progress, first, last);
           },
           py::arg("first"), py::arg("last"), py::keep_alive<0, 1>(),
-          R"doc(Return a context manager: within it, the fractions of calls go from `first` to `last` instead of from 0 to 1.
+          R"doc(Return a context manager: within it, the fractions of calls are a part of what they would be without it.
 
-So several calls are one to whoever reads the fraction. The calls have to be made by the thread that entered the context.
+So several calls are one to whoever reads the fraction: part(0, 0.5) for the first of two, part(0.5, 1) for the second. A
+context is entered once, by the thread that makes the calls and while none is under way; contexts end in the reverse order.
 
 Raises
 ------

@@ -52,7 +52,7 @@ Crossings crossings(std::span<const glm::dvec3> vertices, std::span<const glm::u
       found.complete = found.pairs.size() <= most;
     }
     at_once = found.pairs.size() - before > FaceTree::kLeaf * count ? kFewest : std::min(2 * at_once, kMost);
-    if (progress) progress->update(static_cast<double>(first) / static_cast<double>(near.group_count()));
+    if (progress) progress->update(static_cast<double>(first + count) / static_cast<double>(near.group_count()));
   }
   if (!found.complete) found.pairs.resize(most);
   std::size_t compared = 0;

@@ -71,7 +71,7 @@ class NearFaces {
   /// The number of groups into which for_each_pair() divides the faces: a leaf of a FaceTree, or one face at a hub.
   std::size_t group_count() const { return others_.leaf_count() + crowded_.size(); }
   /// Calls visit(a, b) for all pairs of faces that cross, and for some others whose boxes meet: over all groups once
-  /// for each pair. No face may have been changed or removed.
+  /// for each pair. A visit that returns false ends the search of the group. No face may have been changed or removed.
   template <class Visit>
   void for_each_pair(std::size_t group, Visit&& visit) const;
 

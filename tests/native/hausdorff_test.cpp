@@ -342,6 +342,12 @@ TEST(Hausdorff, ReportsProgressAndStops) {
   EXPECT_STREQ(progress.stage(), "measuring");
   EXPECT_GT(progress.fraction(), 0.5);
   EXPECT_LE(progress.fraction(), 1);
+  {
+    const Progress::Part first(&progress, 0, 0.5);
+    hausdorff(sphere(20, 1), sphere(21, 1.1), {{}, 1, &progress});
+    EXPECT_GT(progress.fraction(), 0.25);
+    EXPECT_LE(progress.fraction(), 0.5);
+  }
   progress.cancel();
   EXPECT_THROW(hausdorff(sphere(20, 1), sphere(21, 1.1), {{}, 1, &progress}), Cancelled);
 }

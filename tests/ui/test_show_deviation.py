@@ -356,7 +356,7 @@ def test_views_places_and_switches():
     xdotool("mousemove", *centre())
     yield
     assert not the_object().tolvol.show_deviation and gone()
-    assert not overlay.shows(the_object()) and not overlay._drawing
+    assert not overlay.shows(the_object()) and not overlay._drawing and not overlay.geometry_buffer._buffers
     assert not any(handler.__module__.startswith("addon.overlay") for handler in bpy.app.handlers.depsgraph_update_post)
     the_object().tolvol.show_deviation = True
     yield from finished(lambda: near() > 30_000)

@@ -58,10 +58,11 @@ def deviation(
     ways = {}
     for number, (way, surface, other) in enumerate((("forward", a, b), ("backward", b, a))):
         pair = (surface.world(), surface.arrays.triangles), (other.world(), other.arrays.triangles)
-        with measure.part_of(progress, number / 2, (number + 1) / 2):
+        with measure.part_of(progress, number / 2, number / 2 + 0.25):
             spread = package.module.deviation(
                 *pair[0], *pair[1], bounds=bounds, percentiles=PERCENTILES, threads=threads, progress=progress
             )
+        with measure.part_of(progress, number / 2 + 0.25, number / 2 + 0.5):
             largest = measure.largest_distance(*pair, tolerance, threads, progress, again=False)
         ways[way] = largest, spread, surface.arrays.polygons
     facts = {name: solidity.facts(surface, threads, progress, again=False) for name, surface in (("a", a), ("b", b))}

@@ -17,7 +17,7 @@ from ..shared.errors import NotProved, NotWritten
 from ..shared.files import safe_files
 from ..shared.proof import report, solidity
 from ..tiles import mapped
-from ..tiles.plan import RECKONED, Plan
+from ..tiles.plan import Plan
 from ..tiles.rounds import Rounds, bounds, needed_space
 from ..tiles.scratch import Scratch
 from . import mesh_files
@@ -196,7 +196,6 @@ class _Run:
             "IN": f"{mesh.path.resolve()}, {status.st_size} bytes, written at {status.st_mtime_ns}",
             "--tolerance": tolerance,
             "--memory": self.options.memory,
-            "plan of the cells": RECKONED,
             **{f"--{name.replace('_', '-')}": value for name, value in options.items()},
         }
 

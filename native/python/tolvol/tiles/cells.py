@@ -67,11 +67,11 @@ EVERYWHERE = Box((-math.inf,) * 3, (math.inf,) * 3)
 
 
 class Cells:
-    """`count` cells that hold about as many of some points, (k, 3), each; fewer where many points lie on each other.
+    """About `count` cells that hold about as many of some points, (k, 3), each; fewer where many points lie on each other.
 
     Each cut is across a long axis of the points. `turn` chooses the axis, and how many of the cells are below the cut. In every
-    second turn there is a cell more, and the first cut is half a cell away from where it would be. So the sides of the cells
-    of one turn lie apart from those of the next. O(k log count).
+    second turn there is a cell more than `count`, and the first cut is half a cell away from where it would be. So most sides
+    of the cells of one turn lie apart from those of the next. O(k log count).
     """
 
     def __init__(self, points, count, turn=0):

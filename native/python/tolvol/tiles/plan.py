@@ -12,8 +12,6 @@ from .cells import Box, Cells, centroids, lowest_and_highest
 # What the work in a cell takes at its peak, in bytes (docs/benchmark.md): by itself; in the first round, where the mesh is the
 # reference, for each of its triangles; and in later rounds, for each triangle of the reference and for each of the mesh.
 FIXED, OF_FIRST, OF_REFERENCE, OF_MESH = 160 << 20, 1650, 700, 1600
-# What the cells depend on besides the mesh, the tolerance and the memory.
-RECKONED = [FIXED, OF_FIRST, OF_REFERENCE, OF_MESH]
 # This share of the memory beside FIXED may be the grid of distances.
 OF_GRID = 1 / 7
 
@@ -57,7 +55,9 @@ class Plan:
     def _loads(self, soups):
         count = sum(soup.count for soup in soups)
         step = math.ceil(max(1, count) / _SAMPLES)
-        corners = np.concatenate([soup.corners()[::step] for soup in soups])
+        corners = np.concatenate(
+            [soup.corners()[::step].copy() for soup in soups]
+        )  # A view would keep all of the soup.
         return [replace(self._reference, of_each=OF_REFERENCE), _Load.of(corners, count, OF_MESH)]
 
     def parts(self, count):
@@ -69,7 +69,7 @@ class Plan:
         return max(0, int((self._memory - FIXED) * OF_GRID))
 
     def _fewest(self, loads, turn):
-        """Returns (the fewest Cells, each of which fits, or None; the least bytes that were found to be needed)."""
+        """Returns (few Cells, each of which fits, or None; the least bytes that were found to be needed)."""
         room = max(0, self._memory - FIXED)
         # Where not even FIXED is there, no cells will do, and the need of small ones is told.
         wanted, finest = (room, _FINEST) if room else (_SMALL * OF_FIRST, 1)

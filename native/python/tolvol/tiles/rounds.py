@@ -87,12 +87,15 @@ class Rounds:
             warnings |= dict.fromkeys(text for record in done for text in record["warnings"])
             made.append((len(boxes), sum(soup.count for soup in present)))
         if len(boxes) > 1:
-            needed = math.ceil(self._plan.needed(present) / 1e6)
-            text = f"the last round had {len(boxes)} cells: with --memory {needed}MB it has one, which may leave fewer triangles"
+            needed = math.ceil(1.05 * self._plan.needed(present) / 1e6)  # Other cells may leave a little more.
+            text = (
+                f"the last round had {len(boxes)} cells: with about --memory {needed}MB it would have one, which may leave "
+                "fewer triangles"
+            )
             warnings[text] = None
         vertices, triangles = tile.mesh_of(np.concatenate([soup.corners() for soup in present]))
         like = Tile(None, present, reference, self._tolerance, self._options)
-        measured = self._steps("certify", "proving", "measured", measure, like, boxes)
+        measured = self._steps("certify", "measuring", "measured", measure, like, boxes)
         forward, backward = (
             Interval(max(record[way][0] for record in measured), max(record[way][1] for record in measured))
             for way in ("forward", "backward")
@@ -168,5 +171,5 @@ def measure(job, progress=None):
 def _give_back():
     """Gives the memory that is free in this process back to the system: glibc keeps much of it, in pieces that are too small
     for the next cell."""
-    with contextlib.suppress(AttributeError, OSError):  # Other systems have no malloc_trim().
+    with contextlib.suppress(AttributeError, OSError, TypeError):  # Other systems have no malloc_trim().
         ctypes.CDLL(None).malloc_trim(0)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The scratch folder of a run, from which a run that was interrupted goes on.
 
-It holds run.json, which says what was asked, the soups, and a record for each step that is done: a file that appears as a whole,
-after the soup of the step. A record is a line with a checksum, and JSON.
+It holds run.json, which says what was asked, the soups, and a record with a checksum for each step that is done: a JSON file that
+appears as a whole, after the soup of the step.
 """
 
 import contextlib
@@ -78,13 +78,13 @@ class Scratch:
     def record(self, name):
         """Returns the record of a step, or None if it is not done."""
         try:
-            checksum, _, text = self.path(f"{name}.json").read_text().partition("\n")
-            if checksum != _checksum(text):
+            found = json.loads(self.path(f"{name}.json").read_text())
+            if found["checksum"] != _checksum(found["record"]):
                 raise ValueError
-            return json.loads(text)
+            return found["record"]
         except FileNotFoundError:
             return None
-        except (OSError, ValueError):
+        except (OSError, ValueError, TypeError, KeyError):
             raise Refused(f"{self.path(name)}.json is damaged: remove {self.folder} and start again") from None
 
     def keep(self, name, record):
@@ -108,8 +108,7 @@ def keep(path, record):
     partial = Path(f"{path}.{uuid.uuid4().hex}.partial")
     try:
         with open(partial, "w") as file:
-            text = json.dumps(record)
-            file.write(f"{_checksum(text)}\n{text}")
+            json.dump({"checksum": _checksum(record), "record": record}, file)
             file.flush()
             os.fsync(file.fileno())
         os.replace(partial, f"{path}.json")
@@ -119,5 +118,5 @@ def keep(path, record):
         raise soups.failed(error, path) from None
 
 
-def _checksum(text):
-    return f"{zlib.crc32(text.encode()):08x}"
+def _checksum(record):
+    return zlib.crc32(json.dumps(record).encode())
