@@ -349,6 +349,8 @@ def test_the_panel_is_told_stage_count_part_and_time_left(waiting, monkeypatch):
     told = operator._run.told()
     assert (told.stage, told.left, told.count) == ("Measuring", "", "")  # A new stage has just begun.
     now[0] += 200
+    assert operator._run.told().left == ""  # A stage may begin in the middle, and nothing was done of it.
+    progress.fraction = 0.75
     assert operator._run.told().left == "3 min left"
 
 
