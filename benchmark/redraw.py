@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measures how long Blender takes to draw its window, alone and with the overlay of the deviation, in a window on a virtual screen.
+"""Measures how long Blender takes to draw its window, alone and with the overlay of the deviation, on a virtual screen.
 
 /usr/bin/python3 benchmark/redraw.py [--triangles 0.1 2] [--write FILE.md]
 
@@ -45,9 +45,9 @@ def seconds():
 def torus(count):
     """Makes a torus of about `count` triangles the only object, and returns it."""
     import bpy
-    import meshes
-    import numpy as np
     from tolerance_volumes.mesh import mesh_io
+
+    import meshes
 
     for ob in list(bpy.data.objects):
         bpy.data.objects.remove(ob)
