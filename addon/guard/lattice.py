@@ -136,9 +136,8 @@ class LatticeWatch(watch.Preparing):
                     return _AT_TOLERANCE, watch.lost_reason(lost)
             if self._keeps_crossings_out:
                 found = solidity.crossing_pairs(replace(arrays, vertices=positions), self._options["threads"])
-                if len(found) >= solidity.MOST_PAIRS:
-                    count = solidity.pair_count(len(found))
-                    return _AT_CROSSINGS, f"{count} pairs of faces cross, too many to keep others out"
+                if reason := solidity.too_many(len(found)):
+                    return _AT_CROSSINGS, reason
                 pairs = set(map(tuple, solidity.polygon_pairs(found, arrays.polygons).tolist()))
                 if self._first_pairs is None:
                     self._first_pairs = pairs

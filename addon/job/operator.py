@@ -120,8 +120,10 @@ class JobOperator:
         if self._has_to_wait():
             return {"CANCELLED"}
         if sum(len(ob.data.polygons) for ob in self.targets(context)) < LARGE:
-            self._begin(context)
-            return self._run.advance() or self._run.go_on(run.PATIENCE) or self._become_modal(context)
+            started = self._start(context)
+            if started == {"RUNNING_MODAL"}:
+                context.window_manager.modal_handler_add(self)
+            return started
         self._waiting = _Waiting(context, self._asked(context))
         status_bar.show(progress_text.status_line(progress_text.preparing(self.bl_label)))
         context.window_manager.modal_handler_add(self)
@@ -140,9 +142,10 @@ class JobOperator:
         meshes = [(ob.name, ob.data.as_pointer(), len(ob.data.vertices)) for ob in self.targets(context)]
         return context.mode, undo_count(), meshes
 
-    def _become_modal(self, context):
-        context.window_manager.modal_handler_add(self)
-        return self._run.begin_modal(context)
+    def _start(self, context):
+        """Begins the run, which goes on by events if it takes longer than PATIENCE. Returns the result of an operator."""
+        self._begin(context)
+        return self._run.advance() or self._run.go_on(run.PATIENCE) or self._run.begin_modal(context)
 
     def modal(self, context, event):
         if self._waiting is None:
@@ -170,8 +173,7 @@ class JobOperator:
                 {"WARNING"}, f"{self.bl_label} did not begin, because something has changed since it was pressed"
             )
             return {"CANCELLED"}
-        self._begin(context)
-        return self._run.advance() or self._run.go_on(run.PATIENCE) or self._run.begin_modal(context)
+        return self._start(context)
 
     def cancel(self, context):
         """Called when Blender closes the window or the file, or a dialog of the operator before its job has begun."""

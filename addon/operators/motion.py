@@ -109,8 +109,8 @@ class Motion:
     def _crossing(self, surface, progress):
         """Returns the pairs of polygons of which triangles cross as a set. Raises Refused for solidity.MOST_PAIRS or more."""
         found = solidity.crossing_pairs(surface.arrays, self.threads, progress)
-        if len(found) >= solidity.MOST_PAIRS:
-            raise Refused(f"{solidity.pair_count(len(found))} pairs of faces cross, too many to keep others out")
+        if reason := solidity.too_many(len(found)):
+            raise Refused(reason)
         polygons = surface.arrays.polygons[found]
         return set(map(tuple, np.sort(polygons, axis=1).tolist()))
 

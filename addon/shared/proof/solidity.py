@@ -58,6 +58,11 @@ def pair_count(pairs):
     return f"at least {MOST_PAIRS:,}" if pairs >= MOST_PAIRS else f"{pairs:,}"
 
 
+def too_many(pairs):
+    """Returns why others cannot be kept out where so many pairs cross that not all are counted, or "" where that is not so."""
+    return f"{pair_count(pairs)} pairs of faces cross, too many to keep others out" if pairs >= MOST_PAIRS else ""
+
+
 def facts(surface, threads=None, progress=None, again=True):
     """Returns the facts about a Surface. About 1.8 us for each triangle.
 

@@ -46,19 +46,16 @@ class Plan:
 
         There is a single cell where all of the mesh and the reference fits the memory; None if no cells fit it.
         """
-        return self._fewest(self._loads(soups), turn)[0]
+        count = sum(soup.count for soup in soups)
+        step = math.ceil(max(1, count) / _SAMPLES)
+        # A view of a part of the corners would keep all of them.
+        corners = np.concatenate([soup.corners()[::step].copy() for soup in soups])
+        loads = [replace(self._reference, of_each=OF_REFERENCE), _Load.of(corners, count, OF_MESH)]
+        return self._fewest(loads, turn)[0]
 
     def needed(self, soups):
         """Returns the bytes with which the round after the one that has left these soups would have a single cell."""
-        return FIXED + sum(load.bytes for load in self._loads(soups))
-
-    def _loads(self, soups):
-        count = sum(soup.count for soup in soups)
-        step = math.ceil(max(1, count) / _SAMPLES)
-        corners = np.concatenate(
-            [soup.corners()[::step].copy() for soup in soups]
-        )  # A view would keep all of the soup.
-        return [replace(self._reference, of_each=OF_REFERENCE), _Load.of(corners, count, OF_MESH)]
+        return FIXED + self._reference.count * OF_REFERENCE + sum(soup.count for soup in soups) * OF_MESH
 
     def parts(self, count):
         """Returns `count` Cells for the soups of the reference."""
