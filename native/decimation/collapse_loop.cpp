@@ -35,6 +35,11 @@ CollapseLoop::Shared::Shared(EdgeCollapse& c)
       refused(stamps.size()),
       spared(stamps.size(), 0) {}
 
+void CollapseLoop::Shared::ask_again() {
+  for (std::atomic<bool>& edge : refused) edge.store(false, std::memory_order_relaxed);
+  std::ranges::fill(spared, std::uint8_t{0});
+}
+
 CollapseLoop::CollapseLoop(Shared& shared, const Regions& regions, std::uint32_t region, Surroundings* around,
                            DeferredProof* later)
     : shared_(shared),

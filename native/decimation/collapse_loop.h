@@ -28,6 +28,8 @@ class CollapseLoop {
   /// The state that the loops over one mesh hand on to each other. Loops over different regions may run at once.
   struct Shared {
     explicit Shared(EdgeCollapse& collapse);
+    /// Lets the next loop try the edges that were refused, wherever they are.
+    void ask_again();
     EdgeCollapse& collapse;
     std::size_t before;                      ///< The number of triangles at the start.
     std::vector<std::uint32_t> stamps;       ///< For each edge, the stamp of the queues.

@@ -36,6 +36,9 @@ constexpr double kMostTakenBack = 0.25;
 /// Up to this cost hardly a collapse is refused, so rounds on trust go at least this far. The unit of costs is the
 /// fourth power of a length; this is a multiple of the fourth power of the tolerance.
 constexpr double kTrustedCost = 1;
+/// The passes over the whole mesh, where bounds refuse collapses. The second one removes three in a hundred of the
+/// triangles that the first one leaves, in a tenth of the time; a third one removes hardly any.
+constexpr int kPasses = 2;
 
 class Rounds {
  public:
@@ -97,23 +100,32 @@ class Rounds {
     }
   }
 
-  /// Works on the whole mesh. It is called last, because it frees what the rounds need.
-  void whole(std::size_t target) {
+  /// Works on the whole mesh, in so many passes. It is called last, because it frees what the rounds need. A pass ends
+  /// when no edge can collapse any more; the next one begins anew, as the first one does if `begins_anew`.
+  void whole(std::size_t target, int passes, bool begins_anew) {
     places_ = {};
     if (mesh_.certified()) mesh_.keep_apart();
-    price();
     std::optional<Surroundings> around;
     if (crossings_) around.emplace(mesh_, *crossings_, team_);
-    CollapseLoop loop(shared_, around ? &*around : nullptr, team_);
-    for (std::uint32_t e = 0; e < costs_.size(); ++e) {
-      poll_at(e);
-      loop.add(e, costs_[e]);
+    for (int pass = 0; pass < passes && mesh_.triangle_count() > target; ++pass) {
+      if (pass > 0 || begins_anew) begin_anew();
+      price();
+      CollapseLoop loop(shared_, around ? &*around : nullptr, team_);
+      for (std::uint32_t e = 0; e < costs_.size(); ++e) {
+        poll_at(e);
+        loop.add(e, costs_[e]);
+      }
+      loop.run({EdgeCollapse::kNever, target}, progress_);
     }
-    costs_ = {};
-    loop.run({EdgeCollapse::kNever, target}, progress_);
   }
 
  private:
+  /// Orders the edges by the faces as they are now, and asks again about those that were refused.
+  void begin_anew() {
+    collapse_.sum_quadrics();
+    shared_.ask_again();
+  }
+
   /// Computes the costs of the edges that may be collapsed now.
   void price() {
     constexpr std::size_t kBlock = 1024;
@@ -199,10 +211,12 @@ class Rounds {
 
 }  // namespace
 
-void collapse_edges(BoundedMesh& mesh, NewCrossings* crossings, std::size_t target, Team& team, Progress* progress) {
+void collapse_edges(BoundedMesh& mesh, NewCrossings* crossings, std::size_t target, bool begins_anew, Team& team,
+                    Progress* progress) {
   Rounds rounds(mesh, crossings, team, progress);
-  if (target == 0 && mesh.certified()) rounds.by_regions();
-  rounds.whole(target);
+  const bool has_rounds = target == 0 && mesh.certified();
+  if (has_rounds) rounds.by_regions();
+  rounds.whole(target, begins_anew ? kPasses : 1, has_rounds && begins_anew);
 }
 
 }  // namespace tolvol

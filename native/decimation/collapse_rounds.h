@@ -20,6 +20,10 @@ namespace tolvol {
 /// rounds, because a target asks for the order of the whole mesh; nor are there rounds without certified bounds. O(n
 /// log n) without bounds. Throws Cancelled, and then leaves a mesh that is proved, with which the caller may go on.
 /// `crossings` is null where crossings are allowed.
-void collapse_edges(BoundedMesh& mesh, NewCrossings* crossings, std::size_t target, Team& team, Progress* progress);
+///
+/// With `begins_anew` the order of the edges is that of the faces as they are after the rounds, and once more when no
+/// edge can collapse any more. Both times it asks again about all edges that were refused.
+void collapse_edges(BoundedMesh& mesh, NewCrossings* crossings, std::size_t target, bool begins_anew, Team& team,
+                    Progress* progress);
 
 }  // namespace tolvol

@@ -35,14 +35,14 @@ class Decimation {
     const std::size_t apart = input_.cut().aside.size();
     const std::size_t target = options_.target_triangles > apart ? options_.target_triangles - apart : 0;
     // Where collapses or refinement end early, the try that is under way is not carried out, so the mesh is proved.
-    until([this] { return is_out_of_time(); },
-          [&] {
-            if (mesh.certified() && options_.crossings == DecimationOptions::Crossings::keep_out) {
-              crossings.emplace(input_.stored_mesh(), mesh.stored_mesh(), input_.faces_aside(),
-                                near_input_faces(input_));
-            }
-            collapse_edges(mesh, crossings ? &*crossings : nullptr, target, team_, options_.progress);
-          });
+    until(
+        [this] { return is_out_of_time(); },
+        [&] {
+          if (mesh.certified() && options_.crossings == DecimationOptions::Crossings::keep_out) {
+            crossings.emplace(input_.stored_mesh(), mesh.stored_mesh(), input_.faces_aside(), near_input_faces(input_));
+          }
+          collapse_edges(mesh, crossings ? &*crossings : nullptr, target, begins_anew(mesh), team_, options_.progress);
+        });
     if (mesh.certified() && options_.effort == DecimationOptions::Effort::thorough && !result_.stopped_at_time) {
       until([this] { return is_out_of_time() || is_asked_to_finish(); },
             [&] { Refinement(mesh, crossings ? &*crossings : nullptr, team_).run(target, options_.progress); });
@@ -54,6 +54,12 @@ class Decimation {
   }
 
  private:
+  /// Thorough leaves as many triangles without it, and so does fast where each vertex stays where it was.
+  bool begins_anew(const BoundedMesh& mesh) const {
+    return mesh.certified() && options_.effort == DecimationOptions::Effort::fast &&
+           options_.placement == DecimationOptions::Placement::optimal;
+  }
+
   bool is_out_of_time() {
     if (!(options_.max_seconds > 0)) return false;
     const std::chrono::duration<double> spent = Clock::now() - start_;

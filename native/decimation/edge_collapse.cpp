@@ -38,6 +38,7 @@ void EdgeCollapse::sum_quadrics() {
   quadrics_.assign(connectivity.n_vertices(), Quadric());
   for (std::uint32_t i = 0; i < connectivity.n_faces(); ++i) {
     poll_at(i);
+    if (!mesh_.alive(i)) continue;
     const glm::uvec3& t = mesh_.triangle(i);
     const glm::dvec3 &a = mesh_.position(t.x), &b = mesh_.position(t.y), &c = mesh_.position(t.z);
     const glm::dvec3 normal = glm::cross(b - a, c - a);
@@ -48,7 +49,7 @@ void EdgeCollapse::sum_quadrics() {
     for (int k = 0; k < 3; ++k) quadrics_[t[k]] += q;
   }
   for (const auto h : connectivity.halfedges()) {
-    if (!connectivity.is_boundary(h)) continue;
+    if (connectivity.status(h).deleted() || !connectivity.is_boundary(h)) continue;
     const glm::uvec3& t = mesh_.triangle(static_cast<std::uint32_t>(connectivity.opposite_face_handle(h).idx()));
     const glm::dvec3 &a = mesh_.position(mesh_.from(h)), &b = mesh_.position(mesh_.to(h)), edge = b - a;
     const glm::dvec3 face =

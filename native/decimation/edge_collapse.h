@@ -54,6 +54,8 @@ class EdgeCollapse {
   Carried carry_out(Attempt& a);
 
   const Quadric& quadric(std::uint32_t vertex) const { return quadrics_[vertex]; }
+  /// Gives each vertex the quadric of the faces that are around it now, as when this was made. O(n).
+  void sum_quadrics();
   /// Puts a quadric back where collapses are taken back.
   void set_quadric(std::uint32_t vertex, const Quadric& quadric) { quadrics_[vertex] = quadric; }
 
@@ -67,7 +69,6 @@ class EdgeCollapse {
     Freedom freedom;
   };
 
-  void sum_quadrics();
   Quadric quadric_of_copies(std::uint32_t vertex) const;
   std::optional<Plan> plan(Edge e) const;
   Plan free_plan(Halfedge h) const;
