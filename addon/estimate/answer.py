@@ -14,7 +14,7 @@ from ..properties import automatic_placement
 from . import known, runs
 
 # *Thorough* leaves about this share of the triangles that *Fast* leaves, if Fast removes this share of them or more.
-_THOROUGH, _MANY = 0.63, 0.25
+_THOROUGH, _MANY = 0.65, 0.25
 _AT_WORK, _TOO_LARGE, _OTHER_MODE = "Estimating", "Too large to estimate", "Decimate needs Object Mode"
 # A float32 tolerance in percent differs from that of the run by a smaller share.
 _SAME = 1e-6
