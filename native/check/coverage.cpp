@@ -39,6 +39,9 @@ constexpr std::uint32_t kMostUnited = 256;
 constexpr std::size_t kMany = 64;
 // A try polls after this many parts of pieces, each of which may look at kMany candidates.
 constexpr std::size_t kPartsBetweenPolls = 64;
+// find_witnesses() searches for so many whole triangles at once, and a thread takes so many of them at a time. A search
+// takes about 0.5 us.
+constexpr std::size_t kSearchedAtOnce = 1 << 16, kSearchedOfBlock = 256;
 // In a change of many elements a thread takes this many at a time. A piece takes about 1 us.
 constexpr std::size_t kElementsOfBlock = 16;
 // This bit of split_into_ marks a triangle some of which is out of reach.
@@ -86,21 +89,32 @@ void Coverage::set_witness(std::uint32_t element, std::uint32_t triangle) {
 }
 
 Coverage::Uncovered Coverage::find_witnesses(std::span<const std::uint32_t> triangles, const TriangleMesh& mesh,
-                                             std::span<const std::uint32_t> ids, double provable, Progress* progress) {
+                                             std::span<const std::uint32_t> ids, double provable, Team& team,
+                                             Progress* progress) {
   if (mesh.triangles.empty()) return {{triangles.begin(), triangles.end()}, {}, {}};
   const Hierarchy hierarchy(mesh);
   Uncovered uncovered;
-  for (std::size_t i = 0; i < triangles.size(); ++i) {
-    poll_at(i);
-    if (progress) progress->update(static_cast<double>(i) / static_cast<double>(triangles.size()));
-    find_witnesses_of(triangles[i], mesh, hierarchy, ids, provable, uncovered);
+  std::vector<Hierarchy::Common> common(std::min(triangles.size(), kSearchedAtOnce));
+  for (std::size_t first = 0; first < triangles.size(); first += kSearchedAtOnce) {
+    const std::span<const std::uint32_t> part =
+        triangles.subspan(first, std::min(common.size(), triangles.size() - first));
+    team.run(part.size(), kSearchedOfBlock, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) common[i] = hierarchy.common(whole(part[i]).corners, provable);
+    });
+    // The lists of pieces and the budgets depend on the order of the triangles.
+    for (std::size_t i = 0; i < part.size(); ++i) {
+      poll_at(i);
+      if (progress) progress->update(static_cast<double>(first + i) / static_cast<double>(triangles.size()));
+      find_witnesses_of(part[i], common[i], mesh, hierarchy, ids, provable, uncovered);
+    }
   }
   return uncovered;
 }
 
-/// Does so for one triangle.
-void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mesh, const Hierarchy& hierarchy,
-                                 std::span<const std::uint32_t> ids, double provable, Uncovered& uncovered) {
+/// Does so for one triangle. `of_whole` is what the hierarchy has in common with all of it.
+void Coverage::find_witnesses_of(std::uint32_t triangle, const Hierarchy::Common& of_whole, const TriangleMesh& mesh,
+                                 const Hierarchy& hierarchy, std::span<const std::uint32_t> ids, double provable,
+                                 Uncovered& uncovered) {
   std::vector<Part> stack{whole(triangle)};
   std::size_t looked = 0;
   bool found_beyond = false;
@@ -118,7 +132,7 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
       distance_[element] = std::max(distance_[element], distance);
       if (piece.cuts > 0) ++split_into_[triangle];
     };
-    const Hierarchy::Common common = hierarchy.common(c, provable, -1, hint);
+    const Hierarchy::Common common = piece.cuts == 0 ? of_whole : hierarchy.common(c, provable, -1, hint);
     if (common.triangle != Hierarchy::kNone) {
       assign(common.triangle, common.distance);
       continue;

@@ -18,6 +18,7 @@
 #include <span>
 #include <vector>
 
+#include "base/parallel.h"
 #include "base/progress.h"
 #include "check/part.h"
 #include "check/piece_list.h"
@@ -60,9 +61,9 @@ class Coverage {
   /// Finds witnesses for triangles of the reference, whose numbers ascend, among the triangles of a mesh. `ids[i]` is
   /// the element that triangle i of the mesh is, or kNone if it never changes. A piece farther than `provable` from all
   /// triangles gets no witness; in a triangle with a point that far, a small part near the mesh may get none either.
-  /// About 2 us a triangle.
+  /// About 1 us a triangle.
   Uncovered find_witnesses(std::span<const std::uint32_t> triangles, const TriangleMesh& mesh,
-                           std::span<const std::uint32_t> ids, double provable, Progress* progress);
+                           std::span<const std::uint32_t> ids, double provable, Team& team, Progress* progress);
 
   /// A point that stands for a piece. sample() adds one for every `stride`-th piece of the element.
   struct Sample {
@@ -103,8 +104,9 @@ class Coverage {
     return distance_[element] == kNoPiece ? kNoPiece : distance_[element] + moved;
   }
   Part whole(std::uint32_t triangle) const { return PieceList::whole(triangle, *reference_); }
-  void find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mesh, const Hierarchy& hierarchy,
-                         std::span<const std::uint32_t> ids, double provable, Uncovered& uncovered);
+  void find_witnesses_of(std::uint32_t triangle, const Hierarchy::Common& of_whole, const TriangleMesh& mesh,
+                         const Hierarchy& hierarchy, std::span<const std::uint32_t> ids, double provable,
+                         Uncovered& uncovered);
   bool may_look(std::size_t looked, std::size_t parts, bool found_beyond);
   struct Placing;
   template <class Call>

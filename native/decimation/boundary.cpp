@@ -87,7 +87,7 @@ BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mes
   }
   std::vector<std::uint32_t> all(reference_.triangles.size());
   std::iota(all.begin(), all.end(), 0u);
-  const Coverage::Uncovered uncovered = backward_->find_witnesses(all, elements, ids, provable, nullptr);
+  const Coverage::Uncovered uncovered = backward_->find_witnesses(all, elements, ids, provable, team, nullptr);
   for (const std::uint32_t t : uncovered.nearest) {
     uncertified_.push_back(elements.triangles[t].x);
     uncertified_.push_back(elements.triangles[t].y);

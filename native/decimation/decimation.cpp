@@ -54,9 +54,10 @@ class Decimation {
   }
 
  private:
-  /// Thorough leaves as many triangles without it, and so does fast where each vertex stays where it was.
+  /// Thorough leaves as many triangles without it, and so does fast where each vertex stays where it was. What a cell
+  /// leaves of a part of the reference is decimated again in the next round, which begins anew by itself.
   bool begins_anew(const BoundedMesh& mesh) const {
-    return mesh.certified() && options_.effort == DecimationOptions::Effort::fast &&
+    return mesh.certified() && !input_.is_part_of_reference() && options_.effort == DecimationOptions::Effort::fast &&
            options_.placement == DecimationOptions::Placement::optimal;
   }
 

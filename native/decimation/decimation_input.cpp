@@ -14,6 +14,8 @@
 namespace tolvol {
 namespace {
 
+constexpr const char* kOutsideCell = "outside the cell";
+
 void check(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const ToleranceVolume* volume,
            const DecimationOptions& options) {
   validate(vertices, triangles);
@@ -98,9 +100,11 @@ void DecimationInput::hold_outside_cell() {
     const auto inside = [&](int k) { return strictly_inside(vertices_[t[k]], *options_.cell); };
     if (inside(0) && inside(1) && inside(2)) continue;
     exempt_[i] = true;
-    pin_corners(i, "outside the cell");
+    pin_corners(i, kOutsideCell);
   }
 }
+
+bool DecimationInput::is_part_of_reference() const { return own_count_ > 0 && report_.locked.contains(kOutsideCell); }
 
 /// Calls visit(input vertex, vertex of the manifold) for all vertices that hold an input vertex: the one that it
 /// became, and those at its place in a face that stands in for a face that was dropped.
@@ -204,7 +208,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   certify_input(certificate, proved);
   // A face that is outside has no witness, and so no angle. It is counted as outside.
   std::erase_if(exceeding_, [&](std::uint32_t t) { return exempt_[cut_.triangle_input[t]]; });
-  options_.two_sided ? cover(provable) : pin_boundary();
+  options_.two_sided ? cover(provable, team) : pin_boundary();
   return &*certified_;
 }
 
@@ -270,7 +274,7 @@ void DecimationInput::certify_input(const Certificate& certificate, std::span<co
 }
 
 /// Finds the first witnesses for every triangle of the reference.
-void DecimationInput::cover(double provable) {
+void DecimationInput::cover(double provable, Team& team) {
   if (own_count_ > 0) {
     for (std::uint32_t i = 0; i < own_count_; ++i) {
       if (!is_of_reference(i)) continue;
@@ -278,7 +282,7 @@ void DecimationInput::cover(double provable) {
       // What is set aside never changes and covers itself.
       if (element != CutMesh::kNone) backward_->set_witness(element, i);
     }
-    if (joined_) cover_divided(provable);
+    if (joined_) cover_divided(provable, team);
     return;
   }
   TriangleMesh elements{positions_, cut_.triangles};
@@ -292,7 +296,7 @@ void DecimationInput::cover(double provable) {
   std::vector<std::uint32_t> all(volume_->reference().triangles.size());
   std::iota(all.begin(), all.end(), 0u);
   if (options_.progress) options_.progress->begin("comparing");
-  const Coverage::Uncovered found = backward_->find_witnesses(all, elements, ids, provable, options_.progress);
+  const Coverage::Uncovered found = backward_->find_witnesses(all, elements, ids, provable, team, options_.progress);
   if (options_.cell) return hold_near(found.in_part, elements, provable);
   report_.uncovered = FaceCount::of(found.triangles);
   if (report_.uncovered.faces) report_.warnings.push_back(take_uncovered(report_.uncovered, options_.outside));
@@ -315,7 +319,7 @@ void DecimationInput::hold_near(std::span<const Part> pieces, const TriangleMesh
 }
 
 /// Finds the first witnesses for the triangles of the reference that were divided, among the pieces.
-void DecimationInput::cover_divided(double provable) {
+void DecimationInput::cover_divided(double provable, Team& team) {
   TriangleMesh pieces{positions_, {}};
   std::vector<std::uint32_t> ids, divided;
   for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
@@ -326,7 +330,7 @@ void DecimationInput::cover_divided(double provable) {
     pieces.triangles.push_back(cut_.triangles[element]);
     ids.push_back(element);
   }
-  const Coverage::Uncovered found = backward_->find_witnesses(divided, pieces, ids, provable, nullptr);
+  const Coverage::Uncovered found = backward_->find_witnesses(divided, pieces, ids, provable, team, nullptr);
   report_.uncovered = FaceCount::of(found.triangles);
   if (report_.uncovered.faces) report_.warnings.push_back(take_uncovered(report_.uncovered, options_.outside));
   for (const std::uint32_t t : found.nearest) {

@@ -48,6 +48,8 @@ class DecimationInput {
   std::span<const glm::uvec3> triangles() const { return triangles_; }
   /// The triangle of the input that one of triangles() is, or is a piece of.
   std::uint32_t parent(std::uint32_t triangle) const { return joined_ ? joined_->parent[triangle] : triangle; }
+  /// Whether the input is the reference and a part of it is held because it lies outside the cell.
+  bool is_part_of_reference() const;
   bool is_piece(std::uint32_t triangle) const { return joined_ && joined_->is_piece[triangle]; }
   /// The barycentric weights of the corners of one of triangles() in its parent, a column for each corner.
   glm::dmat3 weights_in_parent(std::uint32_t triangle) const;
@@ -96,6 +98,7 @@ class DecimationInput {
   void hold_outside_cell();
   void hold_near(std::span<const Part> pieces, const TriangleMesh& elements, double provable);
   TriangleMesh stored_cut() const;
+  std::vector<glm::uvec2> open_edges() const;
   bool join_t_junctions(bool may_divide, Team& team);
   bool may_join(const TJunction& junction) const;
   void label_joined_wedges();
@@ -110,8 +113,8 @@ class DecimationInput {
   bool added_triangles_are_open() const;
   Bounds* set_bounds(Team& team);
   void certify_input(const Certificate& certificate, std::span<const std::uint8_t> proved);
-  void cover(double provable);
-  void cover_divided(double provable);
+  void cover(double provable, Team& team);
+  void cover_divided(double provable, Team& team);
   std::vector<std::uint8_t> face(double provable, Team& team);
   void pin_boundary();
 

@@ -2,6 +2,7 @@
 // What becomes of the T-junctions of a decimation's input: they are joined, or pinned where that cannot be.
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <map>
 
 #include "decimation/decimation_input.h"
@@ -17,11 +18,25 @@ TriangleMesh DecimationInput::stored_cut() const {
   return stored;
 }
 
+/// The open edges at which a face that may change can have a T-junction. With a cell they are those whose boxes meet
+/// it: all others are of faces that stay, and most of those are open only because the input is a part of a mesh.
+std::vector<glm::uvec2> DecimationInput::open_edges() const {
+  if (!options_.cell) return cut_.boundary;
+  std::vector<glm::uvec2> open;
+  std::ranges::copy_if(cut_.boundary, std::back_inserter(open), [&](const glm::uvec2& edge) {
+    Box box;
+    for (int k = 0; k < 2; ++k) box.add(vertices_[cut_.vertex_input[edge[k]]]);
+    return meet(box, *options_.cell);
+  });
+  return open;
+}
+
 /// Puts vertices into the edges and triangles that they lie on, if it may. Returns whether there are T-junctions.
 bool DecimationInput::join_t_junctions(bool may_divide, Team& team) {
-  if (cut_.boundary.empty()) return false;
+  const std::vector<glm::uvec2> open = open_edges();
+  if (open.empty()) return false;
   may_divide = may_divide && !options_.cell;  // The faces at the rim of a cell are other cells', too.
-  const TJunctions found = find_t_junctions(stored_cut(), cut_.boundary, space_.unit_roundoff(), team);
+  const TJunctions found = find_t_junctions(stored_cut(), open, space_.unit_roundoff(), team);
   if (found.empty()) return false;
   if (!may_divide) return true;
   std::vector<TJunction> junctions = found.vertices;
@@ -92,7 +107,7 @@ glm::dmat3 DecimationInput::weights_in_parent(std::uint32_t triangle) const {
 /// Pins what holds the T-junctions together that could not be joined: faces that meet there share no edge along which
 /// they could be kept together while it moves.
 void DecimationInput::pin_t_junctions(Team& team) {
-  for (const std::uint32_t v : t_junctions(stored_cut(), cut_.boundary, space_.unit_roundoff(), team)) {
+  for (const std::uint32_t v : t_junctions(stored_cut(), open_edges(), space_.unit_roundoff(), team)) {
     pin(v, "T-junction");
   }
 }

@@ -43,8 +43,8 @@ template void Hierarchy::box_distances(const Node&, const float (&)[3], const fl
 template void Hierarchy::box_distances(const Node&, const double (&)[3], const double (&)[3], double (&)[kWidth]);
 
 bool Hierarchy::is_nearest_slice(const glm::dvec3& q, std::uint32_t place) const {
-  const Slice& slice = slices_[place];
-  if (slice.from == 0 && slice.to > 1) return true;
+  if (slice_[place] == kNone) return true;
+  const Slice& slice = slices_[slice_[place]];
   const Corners& t = corners_[place];
   const Legs legs(t, slice.hub);
   const glm::dvec3 weights = closest_point(q, t[0], t[1], t[2]).weights;

@@ -162,7 +162,8 @@ class Hierarchy {
   std::vector<std::uint32_t> turned_;    // maps a node to its oriented boxes or kNone; it is empty if no node has any
   std::vector<OrientedBoxes> oriented_;  // replace the boxes of some nodes
   std::vector<Corners> corners_;         // are scaled, in the sorted order, with only the first of equal triangles
-  std::vector<Slice> slices_;            // in the sorted order; empty if no triangle is cut into slices
+  std::vector<Slice> slices_;            // of the triangles that are cut into slices
+  std::vector<std::uint32_t> slice_;     // of each place in the sorted order, or kNone; empty if there are no slices
   std::vector<std::uint32_t> triangle_;  // maps a place in the sorted order to an index in the mesh
   std::vector<std::uint32_t> place_;     // maps an index in the mesh to a place in the sorted order, of any slice
   std::vector<std::uint32_t> twin_;      // is used by twin(), and empty if no two triangles are equal
@@ -227,7 +228,7 @@ std::size_t Hierarchy::for_each_within(const glm::dvec3& p, double radius, Visit
     bool more = true;
     const glm::dvec3 q = scaled(p);
     const auto attempt = [&](std::uint32_t place) {
-      if (!slices_.empty() && !is_nearest_slice(q, place)) return;
+      if (!slice_.empty() && !is_nearest_slice(q, place)) return;
       for (std::uint32_t triangle = triangle_[place]; more && triangle != kNone; triangle = twin(triangle)) {
         more = goes_on(triangle);
       }

@@ -27,7 +27,7 @@ namespace {
 struct Key {
   std::uint64_t code;
   std::uint32_t triangle;
-  std::uint32_t slice = 0;  // counts from the one farthest from the hub
+  std::uint32_t slice = Hierarchy::kNone;  // kNone for all of a triangle
 };
 
 /// A corner that at least this many triangles share is a hub.
@@ -88,7 +88,7 @@ struct Hierarchy::Build {
 
   Hierarchy& tree;
   std::vector<Key> keys;
-  std::vector<Outline> outlines{};  // of the slices in the sorted order, local; empty if there are none
+  std::vector<Outline> outlines{};  // of the slices, local
   struct Range {
     std::uint32_t begin, end;
   };
@@ -205,42 +205,43 @@ struct Hierarchy::Build {
   void cut_at_hubs(const TriangleMesh& mesh) {
     const std::vector<std::pair<std::uint8_t, std::uint8_t>> hubs = find_hubs(mesh);
     if (hubs.empty()) return;
-    struct Cut {
-      Slice slice;
-      Outline outline;
-    };
     std::vector<Key> all;
-    std::vector<Cut> cuts;
+    all.reserve(keys.size());
     for (std::size_t i = 0; i < keys.size(); ++i) {
       poll_at(i);
-      const auto& [hub, most] = hubs[i];
+      const auto& [hub, slices] = hubs[i];
+      if (slices == 1) {
+        all.push_back(keys[i]);
+        continue;
+      }
       const glm::uvec3& t = mesh.triangles[keys[i].triangle];
       const Corners corners{tree.scaled(mesh.vertices[t.x]), tree.scaled(mesh.vertices[t.y]),
                             tree.scaled(mesh.vertices[t.z])};
-      const std::uint8_t slices = Legs(corners, hub % 3u).longer() > 0 ? most : 1;  // one that is a point stays whole
+      if (!(Legs(corners, hub).longer() > 0)) {  // It is a point.
+        all.push_back(keys[i]);
+        continue;
+      }
       float to = std::numeric_limits<float>::infinity(), from = 1 / kTaper;
       for (std::uint8_t k = 0; k < slices; ++k, to = from, from /= kTaper) {
-        const Slice slice{k + 1 == slices ? 0 : from, to, hub % 3u};
+        const Slice slice{k + 1 == slices ? 0 : from, to, hub};
         const Outline o = outline(corners, slice);
         Box box;
         for (const glm::dvec3& corner : o) box.add(corner);
-        all.push_back({code_of(0.5 * box.lower + 0.5 * box.upper), keys[i].triangle, std::uint32_t(cuts.size())});
-        cuts.push_back({slice, o});
+        all.push_back(
+            {code_of(0.5 * box.lower + 0.5 * box.upper), keys[i].triangle, std::uint32_t(tree.slices_.size())});
+        tree.slices_.push_back(slice);
+        outlines.push_back(o);
       }
     }
     keys.swap(all);
     radix_sort(keys);
-    for (const Key& key : keys) {
-      tree.slices_.push_back(cuts[key.slice].slice);
-      outlines.push_back(cuts[key.slice].outline);
-    }
   }
 
   FloatBox triangle_box(std::uint32_t place) const {
     FloatBox box;
-    if (!outlines.empty()) {
+    if (const std::uint32_t slice = keys[place].slice; slice != kNone) {
       for (int k = 0; k < 3; ++k) {
-        const Outline& o = outlines[place];
+        const Outline& o = outlines[slice];
         const float lower = float(std::min({o[0][k], o[1][k], o[2][k], o[3][k], o[4][k]}));
         const float upper = float(std::max({o[0][k], o[1][k], o[2][k], o[3][k], o[4][k]}));
         box.lower[k] = lower - spread(lower) - float(kSliceRoom);
@@ -273,8 +274,8 @@ struct Hierarchy::Build {
     taken.assign(1, 0);
     for (std::size_t place = 0; place < tree.corners_.size(); ++place) {
       poll_at(place);
-      if (!outlines.empty()) {
-        const auto& [p, q, r, s, t] = outlines[place];
+      if (const std::uint32_t slice = keys[place].slice; slice != kNone) {
+        const auto& [p, q, r, s, t] = outlines[slice];
         taken.push_back(taken.back() +
                         glm::length(glm::cross(q - p, r - p) + glm::cross(r - p, s - p) + glm::cross(s - p, t - p)));
         continue;
@@ -282,6 +283,22 @@ struct Hierarchy::Build {
       const Corners& t = tree.corners_[place];
       taken.push_back(taken.back() + glm::length(glm::cross(t[1] - t[0], t[2] - t[0])));
     }
+  }
+
+  /// Makes box i hold a range, and returns half its area.
+  double fit(OrientedBoxes& boxes, int i, Range range) const {
+    const std::size_t count = range.end - range.begin;
+    const auto begin = keys.begin() + range.begin, end = keys.begin() + range.end;
+    if (std::all_of(begin, end, [](const Key& key) { return key.slice == kNone; })) {
+      return boxes.fit(i, std::span<const Corners>(&tree.corners_[range.begin], count), tree.centre_, 0);
+    }
+    std::vector<Outline> around;
+    around.reserve(count);
+    for (std::uint32_t place = range.begin; place < range.end; ++place) {
+      const std::uint32_t slice = keys[place].slice;
+      around.push_back(slice == kNone ? outline(tree.corners_[place], {}) : outlines[slice]);
+    }
+    return boxes.fit(i, std::span<const Outline>(around), glm::dvec3(0), kSliceRoom);
   }
 
   /// Gives the node, whose box is `whole`, oriented boxes if its boxes along the axes overlap or are mostly empty, and
@@ -301,11 +318,7 @@ struct Hierarchy::Build {
     OrientedBoxes boxes;
     double oriented = 0;
     for (std::size_t i = 0; i < parts.size(); ++i) {
-      const std::size_t count = parts[i].end - parts[i].begin;
-      oriented += outlines.empty() ? boxes.fit(int(i), std::span<const Corners>(&tree.corners_[parts[i].begin], count),
-                                               tree.centre_, 0)
-                                   : boxes.fit(int(i), std::span<const Outline>(&outlines[parts[i].begin], count),
-                                               glm::dvec3(0), kSliceRoom);
+      oriented += fit(boxes, int(i), parts[i]);
     }
     if (oriented > kSmaller * along_axes) return;
     tree.turned_.resize(tree.nodes_.size(), kNone);
@@ -380,10 +393,12 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh) {
   build.cut_at_hubs(mesh);
   corners_.resize(build.keys.size());
   triangle_.resize(build.keys.size());
+  if (!slices_.empty()) slice_.reserve(build.keys.size());
   for (std::uint32_t place = 0; place < build.keys.size(); ++place) {
     poll_at(place);
     const std::uint32_t index = build.keys[place].triangle;
     triangle_[place] = index;
+    if (!slices_.empty()) slice_.push_back(build.keys[place].slice);
     for (int k = 0; k < 3; ++k) corners_[place][k] = scaled(mesh.vertices[mesh.triangles[index][k]]);
     for (std::uint32_t i = index; i != kNone; i = twin(i)) place_[i] = place;
   }

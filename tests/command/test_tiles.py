@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The parts of a decimation in cells: reading in blocks, cells, clipping, soups and one cell's work."""
+"""The parts of a decimation in cells: reading in blocks, cells, clipping, chunks and one cell's work."""
 
 import numpy as np
 import pytest
@@ -7,12 +7,13 @@ import tolvol
 from tolvol.command import mesh_files
 from tolvol.command.mesh import Mesh
 from tolvol.shared.errors import Refused
-from tolvol.tiles import clipping, plan, soups
+from tolvol.tiles import chunks, clipping, plan
 from tolvol.tiles.cells import EVERYWHERE, Box, Cells, centroids
+from tolvol.tiles.chunks import mesh_of
 from tolvol.tiles.mapped import MappedMesh
 from tolvol.tiles.rounds import Rounds
 from tolvol.tiles.scratch import Scratch
-from tolvol.tiles.tile import Tile, decimate, measure, mesh_of
+from tolvol.tiles.tile import Tile, decimate, measure
 
 import meshes
 
@@ -176,21 +177,41 @@ def test_no_point_of_a_triangle_that_lies_in_a_side_but_for_rounding_is_missed()
     assert missed, "without the margin some points are missed"
 
 
-# Soups ----------------------------------------------------------------------------------------------------------------
+# Chunks ---------------------------------------------------------------------------------------------------------------
 
 
-def test_a_soup_is_gathered_by_boxes_and_a_damaged_one_is_named(tmp_path):
+def corners_of(found):
+    """Returns the triangles of some chunks, (k, 3, 3), in their order."""
+    return np.concatenate([vertices[triangles] for vertices, triangles in (chunk.mesh() for chunk in found)])
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_chunks_are_gathered_by_boxes_with_a_vertex_at_each_position(tmp_path, dtype):
     vertices, triangles = noisy()
-    corners = vertices[triangles].astype(np.float32)
-    soup = soups.write(tmp_path / "s", corners)
+    corners = vertices[triangles].astype(dtype)
+    writer = chunks.Writer(tmp_path / "blocks")
+    for part in np.array_split(corners[:2000], 3):
+        writer.add(part)
+    both = [writer.end(), chunks.write(tmp_path / "rest", corners[2000:])]
+    assert [chunk.count for chunk in both] == [2000, len(corners) - 2000]
+    everything = chunks.gather(both, EVERYWHERE)
+    assert np.array_equal(everything[0][everything[1]], corners) and everything[0].dtype == dtype
+    assert len(everything[0]) == len(vertices)
     box = Box((0.1, 0.2, -9), (0.8, 9, 9))
+    found, number = chunks.gather(both, box)
     expected = corners[(corners.max(1) >= box.lower).all(1) & (corners.min(1) <= box.upper).all(1)]
-    assert 100 < len(expected) < len(corners) and np.array_equal(soups.gather([soup], box), expected)
-    data = bytearray((tmp_path / "s").read_bytes())
+    assert 100 < len(expected) < len(corners) and np.array_equal(found[number], expected)
+    assert len(np.unique(found, axis=0)) == len(found) == len(np.unique(number))
+
+
+def test_a_damaged_chunk_is_named(tmp_path):
+    vertices, triangles = noisy()
+    chunk = chunks.write(tmp_path / "c", vertices[triangles])
+    data = bytearray((tmp_path / "c").read_bytes())
     data[1000] ^= 1
-    (tmp_path / "s").write_bytes(data)
-    with pytest.raises(Refused, match=f"{tmp_path}/s is damaged"):
-        soups.gather([soup], box)
+    (tmp_path / "c").write_bytes(data)
+    with pytest.raises(Refused, match=f"{tmp_path}/c is damaged"):
+        chunks.gather([chunk], EVERYWHERE)
 
 
 # A cell ---------------------------------------------------------------------------------------------------------------
@@ -198,13 +219,13 @@ def test_a_soup_is_gathered_by_boxes_and_a_damaged_one_is_named(tmp_path):
 
 def rounds(tmp_path, reference, tolerance, counts, **options):
     """Returns the corners after rounds over so many cells each, in a folder of the test."""
-    whole = (soups.write(tmp_path / "reference", reference),)
+    whole = (chunks.write(tmp_path / "reference", reference),)
     present = whole
     for turn, count in enumerate(counts):
         boxes = Cells(reference.mean(1), count, turn).boxes
         tiles = [Tile(box, present, whole, tolerance, OPTIONS | options) for box in boxes]
         present = tuple(decimate(tile, tmp_path / f"{turn}_{i}")[0] for i, tile in enumerate(tiles))
-    return np.concatenate([soup.corners() for soup in present]), present, whole
+    return corners_of(present), present, whole
 
 
 @pytest.mark.parametrize("kind", ["torus", "open", "cut", "soup"])
@@ -242,7 +263,7 @@ def test_a_mesh_that_moved_is_seen_by_measuring_in_cells(tmp_path):
     moved = corners.copy()
     moved[moved[:, :, 0].min(1) > 1.2] += 0.05
     boxes = Cells(corners.mean(1), 4).boxes
-    tiles = [(soups.write(tmp_path / "a", moved),), (soups.write(tmp_path / "b", corners),)]
+    tiles = [(chunks.write(tmp_path / "a", moved),), (chunks.write(tmp_path / "b", corners),)]
     ends = np.array([measure(Tile(box, *tiles, 0.01, OPTIONS)) for box in boxes])
     assert (ends[:, :, 1].max(0) > 0.01).all()
 
@@ -259,11 +280,11 @@ def test_faces_in_a_plane_whose_centroids_round_out_of_it_are_not_lost(tmp_path)
     side = np.nextafter(x, 2)
     middle = [Box((side, low, -np.inf), (np.inf, high, np.inf)) for low, high in ((-np.inf, 0.3), (0.3, np.inf))]
     boxes = [Box((-np.inf,) * 3, (side, 0.6, np.inf)), Box((-np.inf, 0.6, -np.inf), (side, np.inf, np.inf)), *middle]
-    whole = (soups.write(tmp_path / "whole", corners),)
+    whole = (chunks.write(tmp_path / "whole", corners),)
     present = tuple(
         decimate(Tile(box, whole, whole, 0.01, OPTIONS), tmp_path / str(i))[0] for i, box in enumerate(boxes)
     )
-    found = np.concatenate([soup.corners() for soup in present])
+    found = corners_of(present)
     assert tolvol.solidity(*mesh_of(found))["closed"] and len(found) < len(corners)
 
 
@@ -288,11 +309,10 @@ def test_a_face_whose_centroid_is_rounded_into_another_cell_is_kept(tmp_path):
         Box((-far, 0.6, -far), (at, far, far)),
         Box((at, -far, -far), (far,) * 3),
     ]
-    whole = (soups.write(tmp_path / "reference", corners),)
-    parts = [
-        decimate(Tile(box, whole, whole, 0.001, OPTIONS), tmp_path / str(i))[0].corners() for i, box in enumerate(boxes)
-    ]
-    found = np.concatenate(parts)
+    whole = (chunks.write(tmp_path / "reference", corners),)
+    found = corners_of(
+        decimate(Tile(box, whole, whole, 0.001, OPTIONS), tmp_path / str(i))[0] for i, box in enumerate(boxes)
+    )
     area = np.linalg.norm(np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]), axis=1).sum() / 2
     assert area == pytest.approx(1)
 
@@ -303,20 +323,20 @@ def test_a_face_whose_centroid_is_rounded_into_another_cell_is_kept(tmp_path):
 def test_the_cells_fit_the_memory_and_the_last_round_is_whole_if_it_can_be(tmp_path):
     vertices, triangles = noisy()
     mesh = MappedMesh(written(tmp_path / "a.ply", vertices, triangles))
-    everything = soups.write(tmp_path / "everything", vertices[triangles])
-    little = soups.write(tmp_path / "little", vertices[triangles][::20])
+    everything = chunks.write(tmp_path / "everything", vertices[triangles])
+    little = chunks.write(tmp_path / "little", vertices[triangles][::20])
 
     def cells(memory, left):
         planned = plan.Plan(mesh, 0.01, plan.FIXED + memory)
         return len(planned.first.boxes), *(len(planned.later([left], turn).boxes) for turn in (1, 2))
 
-    assert cells(mesh.count * plan.OF_FIRST, everything)[0] == 1
+    assert cells(mesh.count * plan.OF_FIRST_IF_SHORT, everything)[0] == 1
     assert cells(mesh.count * (plan.OF_REFERENCE + plan.OF_MESH), everything) == (1, 1, 1)
     of_little = mesh.count * plan.OF_REFERENCE + little.count * plan.OF_MESH
-    assert cells(of_little, little) == (3, 1, 1)
+    assert cells(of_little, little) == (4, 1, 1)
     # Where nothing has gone, later rounds need as many cells as the first.
     assert min(cells(of_little, everything)) >= 3
-    first, *rest = cells(1000 * plan.OF_FIRST, little)
+    first, *rest = cells(1000 * plan.OF_FIRST_IF_SHORT, little)
     assert mesh.count / 1000 <= first < 2 * mesh.count / 1000
     assert max(rest) < 0.6 * first
 
@@ -324,8 +344,8 @@ def test_the_cells_fit_the_memory_and_the_last_round_is_whole_if_it_can_be(tmp_p
 def test_there_are_no_cells_for_a_later_round_that_cannot_fit_the_memory(tmp_path):
     vertices, triangles = noisy()
     mesh = MappedMesh(written(tmp_path / "a.ply", vertices, triangles))
-    crowded = soups.write(tmp_path / "crowded", np.concatenate([vertices[triangles][:1]] * 2000))
-    planned = plan.Plan(mesh, 0.01, plan.FIXED + 1000 * plan.OF_FIRST)
+    crowded = chunks.write(tmp_path / "crowded", np.concatenate([vertices[triangles][:1]] * 2000))
+    planned = plan.Plan(mesh, 0.01, plan.FIXED + 1000 * plan.OF_FIRST_IF_SHORT)
     assert planned.later([crowded], 1) is None
     assert planned.needed([crowded]) == plan.FIXED + mesh.count * plan.OF_REFERENCE + 2000 * plan.OF_MESH
 
@@ -335,7 +355,7 @@ def test_too_little_memory_is_refused_with_what_is_needed(tmp_path):
     with pytest.raises(Refused, match=r"--memory: 1 MB is too little: .* need at least \d+ MB"):
         plan.Plan(mesh, 0.1, 1_000_000)
     with pytest.raises(Refused, match="--memory"):
-        plan.Plan(mesh, 1.0, plan.FIXED + 100 * plan.OF_FIRST)
+        plan.Plan(mesh, 1.0, plan.FIXED + 100 * plan.OF_FIRST_IF_SHORT)
 
 
 @pytest.mark.parametrize("count", [2, 3, 4, 7])
@@ -368,14 +388,16 @@ def test_triangles_that_reach_into_many_cells_need_memory_in_each(tmp_path):
     short = MappedMesh(written(tmp_path / "short.ply", ends.reshape(-1, 3), np.arange(6000).reshape(-1, 3)))
     ends[:, 2, 2] += 2
     long = MappedMesh(written(tmp_path / "long.ply", ends.reshape(-1, 3), np.arange(6000).reshape(-1, 3)))
-    few, more = (len(plan.Plan(mesh, 0.001, plan.FIXED + 800 * plan.OF_FIRST).first.boxes) for mesh in (short, long))
+    few, more = (
+        len(plan.Plan(mesh, 0.001, plan.FIXED + 800 * plan.OF_FIRST_IF_SHORT).first.boxes) for mesh in (short, long)
+    )
     assert few <= 4 < more
 
 
 def test_hopelessly_little_memory_for_many_triangles_is_refused_after_few_tries(tmp_path, monkeypatch):
     mesh, made = MappedMesh(written(tmp_path / "a.ply", *meshes.plate(n=257))), []
     monkeypatch.setattr(plan, "Cells", lambda points, count, turn: made.append(count) or Cells(points, count, turn))
-    for tolerance, memory in ((0.001, 1_000_000), (0.5, plan.FIXED + 100 * plan.OF_FIRST)):
+    for tolerance, memory in ((0.001, 1_000_000), (0.5, plan.FIXED + 100 * plan.OF_FIRST_IF_SHORT)):
         with pytest.raises(Refused, match="--memory"):
             plan.Plan(mesh, tolerance, memory)
     assert sum(made) < mesh.count / 8  # Cells of a triangle each would take minutes.
@@ -386,7 +408,7 @@ def test_hopelessly_little_memory_for_many_triangles_is_refused_after_few_tries(
 
 def test_a_run_that_goes_on_does_no_finished_step_again(tmp_path):
     mesh = MappedMesh(written(tmp_path / "a.ply", *noisy()))
-    planned = plan.Plan(mesh, 0.02, plan.FIXED + 2000 * plan.OF_FIRST)
+    planned = plan.Plan(mesh, 0.02, plan.FIXED + 2000 * plan.OF_FIRST_IF_SHORT)
     done = []
 
     def run(last):
@@ -416,7 +438,7 @@ def test_a_run_that_goes_on_does_no_finished_step_again(tmp_path):
 def test_there_are_at_most_six_rounds_and_more_memory_is_proposed(tmp_path, monkeypatch):
     vertices, triangles = noisy()
     mesh = MappedMesh(written(tmp_path / "a.ply", vertices, triangles))
-    planned = plan.Plan(mesh, 0.02, plan.FIXED + 2000 * plan.OF_FIRST)
+    planned = plan.Plan(mesh, 0.02, plan.FIXED + 2000 * plan.OF_FIRST_IF_SHORT)
     monkeypatch.setattr("tolvol.tiles.rounds._LEAST_GAIN", -1)  # Each round is worth another.
 
     def each(stage, title, work, jobs):
@@ -428,7 +450,7 @@ def test_there_are_at_most_six_rounds_and_more_memory_is_proposed(tmp_path, monk
     assert len(found.rounds) == 6 and found.rounds[-1][0] > 1
     (note,) = found.warnings
     needed = int(note.partition("--memory ")[2].partition("MB")[0]) * 1_000_000
-    left = soups.write(tmp_path / "left", found.vertices[found.triangles])
+    left = chunks.write(tmp_path / "left", found.vertices[found.triangles])
     assert len(plan.Plan(mesh, 0.02, needed).later([left], 1).boxes) == 1
     assert f"the last round had {found.rounds[-1][0]} cells" in note
     folder.close(discard=True)

@@ -166,6 +166,41 @@ TEST(DecimationCell, HoldsWhatCoversTheRestOfAPiece) {
   EXPECT_LT(result.size(), mesh.size()) << "the far rim is free";
 }
 
+/// Two plates of squares meet at x = 0. Each edge of the coarse one has a vertex of the fine one at its middle.
+TEST(DecimationCell, HoldsItsTJunctionsAndNoOthers) {
+  constexpr int kCount = 8;
+  Soup plates;
+  for (const int side : {-1, 1}) {
+    const double length = side < 0 ? 1.0 / kCount : 2.0 / kCount;
+    for (double x = 0; x < 1; x += length) {
+      for (double y = -1; y < 1; y += length) {
+        const dvec3 a(side * x, y, 0), b(side * (x + length), y, 0), c(side * (x + length), y + length, 0);
+        const dvec3 d(side * x, y + length, 0);
+        plates.push_back(side > 0 ? std::array{a, b, c} : std::array{a, c, b});
+        plates.push_back(side > 0 ? std::array{a, c, d} : std::array{a, d, c});
+      }
+    }
+  }
+  const auto left_of = [&](const Box& cell) {
+    Soup near = plates;
+    std::erase_if(near, [&](const auto& corners) { return !meet(box_of(corners), cell); });
+    EXPECT_LT(near.size(), plates.size());
+    const TriangleMesh part = mesh_of(near);
+    const ToleranceVolume volume(part.vertices, part.triangles, space(), 0.01);
+    DecimationOptions options;
+    options.cell = cell;
+    return decimate(part.vertices, part.triangles, space(), &volume, options);
+  };
+  const DecimationResult at_the_seam = left_of(halves(1, 0.05).front());
+  EXPECT_GE(at_the_seam.locked.at("T-junction"), std::size_t{kCount});
+  for (int i = 0; i <= kCount; ++i) {
+    const dvec3 on_the_seam(0, double(i) / kCount - 1, 0);
+    EXPECT_TRUE(std::ranges::find(at_the_seam.vertices, on_the_seam) != at_the_seam.vertices.end()) << on_the_seam.y;
+  }
+  const DecimationResult beside_it = left_of(halves(0, 0.3).back());
+  EXPECT_FALSE(beside_it.locked.contains("T-junction")) << "the rim of the part is none";
+}
+
 TEST(DecimationCell, NeedsBothDirectionsAndAVolume) {
   const TriangleMesh mesh = shapes::sphere(4);
   const ToleranceVolume volume(mesh.vertices, mesh.triangles, space(), 0.01);

@@ -22,7 +22,8 @@ TEST(FindWitnesses, TakesFacesAtAHubWhole) {
   std::vector<std::uint32_t> all(reference.triangles.size());
   std::iota(all.begin(), all.end(), 0u);
   Coverage coverage(reference, kLimit, all.size());
-  EXPECT_TRUE(coverage.find_witnesses(all, mesh, all, kLimit, nullptr).triangles.empty());
+  Team team(1);
+  EXPECT_TRUE(coverage.find_witnesses(all, mesh, all, kLimit, team, nullptr).triangles.empty());
   std::size_t pieces = 0;
   for (const std::uint32_t face : all) pieces += coverage.piece_count(face);
   EXPECT_EQ(pieces, all.size()) << "no face is cut";

@@ -78,8 +78,8 @@ def add(parser):
         "--scratch",
         type=file_name,
         metavar="DIR",
-        help="the folder for temporary files, new or empty: about 110 bytes for each triangle of IN, twice as much for "
-        "float64 (default: OUT.tolvol beside OUT). It is removed at the end",
+        help="the folder for temporary files, new or empty: mostly 50 bytes for each triangle of IN and at most 144, or "
+        "252 for float64 (default: OUT.tolvol beside OUT). It is removed at the end",
     )
     group.add_argument(
         "--scheduler",

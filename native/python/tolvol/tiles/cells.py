@@ -26,6 +26,9 @@ class Box:
     def meets(self, other):
         return all(a <= d and c <= b for a, b, c, d in zip(self.lower, self.upper, other.lower, other.upper))
 
+    def contains(self, other):
+        return all(a <= c and d <= b for a, b, c, d in zip(self.lower, self.upper, other.lower, other.upper))
+
     def holds(self, points):
         """Tells which points, (k, 3), are in the box or on one of its lower sides: each point is so in one cell alone."""
         return _all_three((points >= np.array(self.lower)) & (points < np.array(self.upper)))

@@ -30,12 +30,12 @@ def clipped(corners, box):
     return corners
 
 
-def rounding(corners):
-    """Returns an upper bound, a length, of how far clipped() carries a point of triangles, (k, 3, 3), by its rounding.
+def rounding(points):
+    """Returns an upper bound, a length, of how far clipped() carries a point of triangles with these corners by its rounding.
 
     Each of six cuts rounds a coordinate by a few units in the last place of the largest coordinate.
     """
-    return 128 * float(np.finfo(np.float64).eps) * float(np.abs(corners).max(initial=0))
+    return 128 * float(np.finfo(np.float64).eps) * float(np.abs(points).max(initial=0))
 
 
 def are_shallow(corners, box, margin):

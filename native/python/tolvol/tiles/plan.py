@@ -10,8 +10,10 @@ from ..shared.errors import Refused
 from .cells import Box, Cells, centroids, lowest_and_highest
 
 # What the work in a cell takes at its peak, in bytes (docs/benchmark.md): by itself; in the first round, where the mesh is the
-# reference, for each of its triangles; and in later rounds, for each triangle of the reference and for each of the mesh.
-FIXED, OF_FIRST, OF_REFERENCE, OF_MESH = 160 << 20, 1650, 700, 1600
+# reference, for each of its triangles; the same where the tolerance is short, because more triangles of the reference are cut
+# into pieces then; and in later rounds, for each triangle of the reference and for each of the mesh.
+FIXED, OF_FIRST, OF_FIRST_IF_SHORT, OF_REFERENCE, OF_MESH = 160 << 20, 1000, 1800, 400, 2200
+_SHORT = 1 / 4  # of the median edge
 # This share of the memory beside FIXED may be the grid of distances.
 OF_GRID = 1 / 7
 
@@ -32,7 +34,9 @@ class Plan:
     def __init__(self, mesh, tolerance, memory):
         self._tolerance, self._memory = tolerance, memory
         corners = _samples(mesh)
-        self._points, self._reference = centroids(corners), _Load.of(corners, mesh.count, OF_FIRST)
+        self._points = centroids(corners)
+        self._of_first = OF_FIRST_IF_SHORT if tolerance < _SHORT * _median_edge(corners) else OF_FIRST
+        self._reference = _Load.of(corners, mesh.count, self._of_first)
         cells, needed = self._fewest([self._reference], 0)
         if not cells:
             raise Refused(
@@ -41,24 +45,25 @@ class Plan:
             )
         self.first = cells
 
-    def later(self, soups, turn):
-        """Returns the Cells of round `turn`, 1 for the second one, for the mesh that these soups hold.
+    def later(self, chunks, turn):
+        """Returns the Cells of round `turn`, 1 for the second one, for the mesh that these chunks hold.
 
         There is a single cell where all of the mesh and the reference fits the memory; None if no cells fit it.
         """
-        count = sum(soup.count for soup in soups)
+        count = sum(chunk.count for chunk in chunks)
         step = math.ceil(max(1, count) / _SAMPLES)
-        # A view of a part of the corners would keep all of them.
-        corners = np.concatenate([soup.corners()[::step].copy() for soup in soups])
+        corners = np.concatenate(
+            [vertices[triangles[::step]] for vertices, triangles in (chunk.mesh() for chunk in chunks)]
+        )
         loads = [replace(self._reference, of_each=OF_REFERENCE), _Load.of(corners, count, OF_MESH)]
         return self._fewest(loads, turn)[0]
 
-    def needed(self, soups):
-        """Returns the bytes with which the round after the one that has left these soups would have a single cell."""
-        return FIXED + self._reference.count * OF_REFERENCE + sum(soup.count for soup in soups) * OF_MESH
+    def needed(self, chunks):
+        """Returns the bytes with which the round after the one that has left these chunks would have a single cell."""
+        return FIXED + self._reference.count * OF_REFERENCE + sum(chunk.count for chunk in chunks) * OF_MESH
 
     def parts(self, count):
-        """Returns `count` Cells for the soups of the reference."""
+        """Returns `count` Cells for the chunks of the reference."""
         return Cells(self._points, count)
 
     def grid_memory(self):
@@ -69,7 +74,7 @@ class Plan:
         """Returns (few Cells, each of which fits, or None; the least bytes that were found to be needed)."""
         room = max(0, self._memory - FIXED)
         # Where not even FIXED is there, no cells will do, and the need of small ones is told.
-        wanted, finest = (room, _FINEST) if room else (_SMALL * OF_FIRST, 1)
+        wanted, finest = (room, _FINEST) if room else (_SMALL * self._of_first, 1)
         points = self._points
         places = points[:: max(1, len(points) // _PLACES)]
         # No cell that holds one of these places needs less.
@@ -118,6 +123,11 @@ class _Load:
 
     def _bytes_of(self, counts):
         return counts * (self.bytes / max(1, len(self.lowest)))
+
+
+def _median_edge(corners):
+    """Returns the median length of the edges of triangles, (k, 3, 3)."""
+    return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
 
 
 def _samples(mesh):

@@ -14,15 +14,15 @@ from functools import reduce
 import numpy as np
 
 from ..shared.proof.verdict import Interval
-from . import scratch, soups, tile
-from .cells import Box, centroids
-from .soups import Soup
+from . import chunks, scratch, tile
+from .cells import EVERYWHERE, Box, centroids
+from .chunks import Chunk
 from .tile import Tile
 
 _MOST_ROUNDS = 6
-_PARTS = 8  # soups of the reference for each cell of the first round
+_PARTS = 8  # chunks of the reference for each cell of the first round
 # There is no further round of several cells after one that removes a smaller share of the triangles.
-_LEAST_GAIN = 0.01
+_LEAST_GAIN = 0.02
 
 
 @dataclass(frozen=True)
@@ -45,15 +45,16 @@ class Result:
 
 def bounds(mesh):
     """Returns the bounding Box of a MappedMesh. Raises Refused for a vertex that is not finite, and all else that is damaged."""
-    return reduce(Box.joined, (soups.bounds_of(corners) for corners in mesh.blocks()))
+    return reduce(Box.joined, (chunks.bounds_of(corners.reshape(-1, 3)) for corners in mesh.blocks()))
 
 
 def needed_space(mesh):
     """Returns the bytes that a run takes of the scratch folder at its peak, at most.
 
-    They are the soups of the reference, which overlap nowhere, those of the present mesh, and those that replace them.
+    They are the chunks of the reference, which overlap nowhere, those of the present mesh, and those that replace them.
     """
-    return 3 * mesh.count * 9 * mesh.dtype.itemsize
+    of_triangle = 9 * mesh.dtype.itemsize + 3 * 4  # where no vertex is shared
+    return 3 * mesh.count * of_triangle
 
 
 class Rounds:
@@ -80,12 +81,12 @@ class Rounds:
             options = self._options if number or len(boxes) == 1 else {**self._options, "effort": "fast"}
             like = Tile(None, present, reference, self._tolerance, options, self._plan.grid_memory())
             done = self._steps("decimation", f"round {number + 1}", f"round{number}", decimate, like, boxes)
-            before, present = present, tuple(Soup.read_from(record["soup"]) for record in done)
+            before, present = present, tuple(Chunk.read_from(record["chunk"]) for record in done)
             if before != reference:
-                self._scratch.remove_soups(before)
+                self._scratch.remove_chunks(before)
             angles += [record["angle"] for record in done]
             warnings |= dict.fromkeys(text for record in done for text in record["warnings"])
-            made.append((len(boxes), sum(soup.count for soup in present)))
+            made.append((len(boxes), sum(chunk.count for chunk in present)))
         if len(boxes) > 1:
             needed = math.ceil(1.05 * self._plan.needed(present) / 1e6)  # Other cells may leave a little more.
             text = (
@@ -93,7 +94,7 @@ class Rounds:
                 "fewer triangles"
             )
             warnings[text] = None
-        vertices, triangles = tile.mesh_of(np.concatenate([soup.corners() for soup in present]))
+        vertices, triangles = chunks.gather(present, EVERYWHERE)
         like = Tile(None, present, reference, self._tolerance, self._options)
         measured = self._steps("certify", "measuring", "measured", measure, like, boxes)
         forward, backward = (
@@ -104,11 +105,11 @@ class Rounds:
         return Result(vertices, triangles, tuple(made), forward, backward, angle, tuple(warnings))
 
     def _reference(self):
-        """Returns the soups of the triangles of the file, each of a part of space."""
+        """Returns the chunks of the triangles of the file, each of a part of space."""
         if record := self._scratch.record("reference"):
-            return tuple(map(Soup.read_from, record["soups"]))
+            return tuple(map(Chunk.read_from, record["chunks"]))
         parts = self._plan.parts(_PARTS * len(self._plan.first.boxes))
-        writers = [soups.Writer(self._scratch.path(f"reference_{i:05}")) for i in range(len(parts.boxes))]
+        writers = [chunks.Writer(self._scratch.path(f"reference_{i:05}")) for i in range(len(parts.boxes))]
 
         def write(corners, progress):
             number = parts.of(centroids(corners))
@@ -121,13 +122,13 @@ class Rounds:
             pass
         self._mesh.require_unchanged()
         found = tuple(writer.end() for writer in writers)
-        self._scratch.keep("reference", {"soups": [soup.record() for soup in found]})
+        self._scratch.keep("reference", {"chunks": [chunk.record() for chunk in found]})
         return found
 
     def _boxes(self, number, present, made):
         """Returns the boxes of the cells of a round, or None if there is no such round.
 
-        They are kept, because the soups that they depend on are removed.
+        They are kept, because the chunks that they depend on are removed.
         """
         if record := self._scratch.record(f"cells{number}"):
             return [Box(*map(tuple, box)) for box in record["boxes"]]
@@ -153,11 +154,11 @@ class Rounds:
 
 
 def decimate(job, progress=None):
-    """Does the work of a round in one cell, and notes that it is done. job: (Tile, the path of its soup)."""
+    """Does the work of a round in one cell, and notes that it is done. job: (Tile, the path of its chunk)."""
     one, path = job
-    soup, angle, warnings = tile.decimate(one, path, progress)
+    chunk, angle, warnings = tile.decimate(one, path, progress)
     _give_back()
-    scratch.keep(path, {"soup": soup.record(), "angle": angle, "warnings": warnings})
+    scratch.keep(path, {"chunk": chunk.record(), "angle": angle, "warnings": warnings})
 
 
 def measure(job, progress=None):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The scratch folder of a run, from which a run that was interrupted goes on.
 
-It holds run.json, which says what was asked, the soups, and a record with a checksum for each step that is done: a JSON file that
-appears as a whole, after the soup of the step.
+It holds run.json, which says what was asked, the chunks, and a record with a checksum for each step that is done: a JSON file
+that appears as a whole, after the chunk of the step.
 """
 
 import contextlib
@@ -15,7 +15,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 from ..shared.errors import Refused
-from . import soups
+from . import chunks
 
 _ASKED = "run"
 
@@ -28,14 +28,14 @@ class Scratch:
     """
 
     def __init__(self, folder, asked, resume):
-        # Records name soups by their path, which other working directories and the workers of Dask have to find.
+        # Records name chunks by their path, which other working directories and the workers of Dask have to find.
         self.folder = Path(os.path.realpath(folder))
         try:
             self.folder.mkdir(exist_ok=True)
             self._require_own()
             self._lock = os.open(self.folder / "lock", os.O_RDWR | os.O_CREAT)
         except OSError as error:
-            raise soups.failed(error, self.folder) from None
+            raise chunks.failed(error, self.folder) from None
         try:
             self._take(asked, resume)
         except BaseException:
@@ -91,10 +91,10 @@ class Scratch:
         """Notes that a step is done."""
         keep(self.path(name), record)
 
-    def remove_soups(self, soups):
-        """Removes the files of soups. The records of their steps stay, so that no step is done again."""
-        for soup in soups:
-            Path(soup.path).unlink(missing_ok=True)
+    def remove_chunks(self, removed):
+        """Removes the files of chunks. The records of their steps stay, so that no step is done again."""
+        for chunk in removed:
+            Path(chunk.path).unlink(missing_ok=True)
 
     def close(self, discard):
         """Lets others use the folder. discard: whether the run is done, so that the folder is removed."""
@@ -104,7 +104,7 @@ class Scratch:
 
 
 def keep(path, record):
-    """Writes the record of a step whose soup is, or would be, at `path`."""
+    """Writes the record of a step whose chunk is, or would be, at `path`."""
     partial = Path(f"{path}.{uuid.uuid4().hex}.partial")
     try:
         with open(partial, "w") as file:
@@ -115,7 +115,7 @@ def keep(path, record):
     except OSError as error:
         with contextlib.suppress(OSError):
             partial.unlink()
-        raise soups.failed(error, path) from None
+        raise chunks.failed(error, path) from None
 
 
 def _checksum(record):

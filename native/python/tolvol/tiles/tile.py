@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The work in one cell: decimates the faces in it, or measures the distances of what is there.
 
-Each function reads soups and writes or returns what it found, and depends on nothing else: any process may call it.
+Each function reads chunks and writes or returns what it found, and depends on nothing else: any process may call it.
 """
 
 from dataclasses import dataclass, field
@@ -10,8 +10,7 @@ import numpy as np
 
 from ..shared import package
 from ..shared.proof.measure import part_of
-from ..welding import welded
-from . import clipping, soups
+from . import chunks, clipping
 from .cells import Box, centroids
 
 _BLOCK = 1 << 16  # triangles that are looked at at once
@@ -19,7 +18,7 @@ _BLOCK = 1 << 16  # triangles that are looked at at once
 
 @dataclass(frozen=True)
 class Tile:
-    """A cell, the soups of the present mesh, and those of the reference."""
+    """A cell, the chunks of the present mesh, and those of the reference."""
 
     cell: Box
     mesh: tuple
@@ -33,19 +32,18 @@ def decimate(tile, output, progress=None):
     """Decimates the faces inside the cell, and writes the faces that the cell owns to `output`.
 
     The cell owns the faces inside it, and of those that reach out of it the ones with their centroid in the cell. Returns
-    (Soup, the largest angle in degrees between a new face and its witnesses, or None if there is a face without an angle, and a
+    (Chunk, the largest angle in degrees between a new face and its witnesses, or None if there is a face without an angle, and a
     list of warnings).
     """
-    corners = soups.gather(tile.mesh, tile.cell)
-    inside = tile.cell.strictly_holds_triangles(corners)
-    owned = corners[~inside & tile.cell.holds(centroids(corners))]
-    vertices, triangles = mesh_of(corners)
-    del corners  # The memory is needed.
+    vertices, triangles = chunks.gather(tile.mesh, tile.cell)
+    inside = chunks.of_corners(vertices, triangles, tile.cell.strictly_holds_triangles)
+    outside = vertices[triangles[~inside]]
+    owned = outside[tile.cell.holds(centroids(outside))]
     decimated = (
         _decimated(tile, vertices, triangles, inside, progress) if _has_area(vertices, triangles[inside]) else None
     )
     kept, angle, warnings = decimated or (vertices[triangles[inside]], 0.0, [])
-    return soups.write(output, np.concatenate([kept, owned])), angle, warnings
+    return chunks.write(output, np.concatenate([kept, owned])), angle, warnings
 
 
 def _decimated(tile, vertices, triangles, inside, progress):
@@ -54,7 +52,7 @@ def _decimated(tile, vertices, triangles, inside, progress):
     if tile.reference == tile.mesh:
         around = vertices, triangles
     else:
-        around = mesh_of(soups.gather(tile.reference, tile.cell.grown(tile.tolerance)))
+        around = chunks.gather(tile.reference, tile.cell.grown(tile.tolerance))
     threads = tile.options["threads"]
     try:
         volume = native.ToleranceVolume(
@@ -88,40 +86,28 @@ def measure(tile, progress=None):
 
 
 def _largest(those, others, tile, threads, progress):
-    corners = soups.gather(those, tile.cell)
-    rounding = clipping.rounding(corners)
+    vertices, triangles = chunks.gather(those, tile.cell)
+    rounding = clipping.rounding(vertices)
     box = tile.cell.grown(rounding)
-    inside = tile.cell.strictly_holds_triangles(corners)  # Clipping would give these back as they are.
-    vertices, triangles = mesh_of(corners[inside])
-    rest = corners[~inside]
-    del corners, inside  # The memory is needed.
+    # Clipping would give these back as they are.
+    inside = chunks.of_corners(vertices, triangles, tile.cell.strictly_holds_triangles)
+    rest = vertices[triangles[~inside]]
+    vertices, triangles = chunks.selected(vertices, triangles, inside)
     # Only triangles that hardly leave a side of the cell need the larger box, by which the cells together miss no point: of all
     # others, what a cell misses is near what it has. The larger box makes slivers, which take long to measure.
     shallow = clipping.are_shallow(rest, tile.cell, rounding)
     clipped = np.concatenate([clipping.clipped(rest[~shallow], tile.cell), clipping.clipped(rest[shallow], box)])
-    vertices, triangles = _joined((vertices, triangles), mesh_of(clipped))
+    vertices, triangles = chunks.joined([(vertices, triangles), chunks.mesh_of(clipped)])
     rounding *= clipping.STEEP_LOSS
     if not len(triangles):
         return 0.0, 0.0
-    around = soups.gather(others, box.grown(tile.tolerance))
-    if not len(around):
+    around = chunks.gather(others, box.grown(tile.tolerance))
+    if not len(around[1]):
         return tile.tolerance, np.inf
     found = package.module.directed_hausdorff(
-        vertices, triangles, *mesh_of(around), bound=tile.tolerance, threads=threads, progress=progress
+        vertices, triangles, *around, bound=tile.tolerance, threads=threads, progress=progress
     )
     return max(found.lower - rounding, 0.0), found.upper + rounding
-
-
-def mesh_of(corners):
-    """Returns (vertices, triangles) of a soup, with one vertex at each position."""
-    vertices, number = welded(corners.reshape(-1, 3))
-    return vertices, number.reshape(-1, 3)
-
-
-def _joined(one, other):
-    """Returns (vertices, triangles) of two meshes together, whose vertices stay apart, as float64."""
-    vertices = np.concatenate([one[0], other[0]], dtype=np.float64)
-    return vertices, np.concatenate([one[1], other[1] + len(one[0])], dtype=np.int32)
 
 
 def _has_area(vertices, triangles):
