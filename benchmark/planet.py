@@ -10,7 +10,7 @@ _NOISE = 0.1  # standard deviation of the height of a vertex, times the distance
 
 
 def rows_of(triangles):
-    """Returns the number of rows between a pole and the equator of a planet of about so many triangles."""
+    """Returns how many rows of triangles a planet of about so many triangles has between a pole and the equator."""
     return max(1, round((triangles / 8) ** 0.5))
 
 

@@ -39,9 +39,10 @@ constexpr std::uint32_t kMostUnited = 256;
 constexpr std::size_t kMany = 64;
 // A try polls after this many parts of pieces, each of which may look at kMany candidates.
 constexpr std::size_t kPartsBetweenPolls = 64;
-// find_witnesses() searches for so many whole triangles at once, and a thread takes so many of them at a time. A search
-// takes about 0.5 us.
-constexpr std::size_t kSearchedAtOnce = 1 << 16, kSearchedOfBlock = 256;
+// find_witnesses() searches for the witnesses of this many whole triangles before it assigns them.
+constexpr std::size_t kSearchedAtOnce = 1 << 16;
+// A thread takes this many of them at a time. A search takes about 0.5 us.
+constexpr std::size_t kSearchedOfBlock = 256;
 // In a change of many elements a thread takes this many at a time. A piece takes about 1 us.
 constexpr std::size_t kElementsOfBlock = 16;
 // This bit of split_into_ marks a triangle some of which is out of reach.
@@ -101,7 +102,7 @@ Coverage::Uncovered Coverage::find_witnesses(std::span<const std::uint32_t> tria
     team.run(part.size(), kSearchedOfBlock, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) common[i] = hierarchy.common(whole(part[i]).corners, provable);
     });
-    // The lists of pieces and the budgets depend on the order of the triangles.
+    // On one thread and in order, because the lists of pieces and the budgets depend on it.
     for (std::size_t i = 0; i < part.size(); ++i) {
       poll_at(i);
       if (progress) progress->update(static_cast<double>(first + i) / static_cast<double>(triangles.size()));
@@ -111,7 +112,7 @@ Coverage::Uncovered Coverage::find_witnesses(std::span<const std::uint32_t> tria
   return uncovered;
 }
 
-/// Does so for one triangle. `of_whole` is what the hierarchy has in common with all of it.
+/// Does so for one triangle. `of_whole` is hierarchy.common() of its corners.
 void Coverage::find_witnesses_of(std::uint32_t triangle, const Hierarchy::Common& of_whole, const TriangleMesh& mesh,
                                  const Hierarchy& hierarchy, std::span<const std::uint32_t> ids, double provable,
                                  Uncovered& uncovered) {

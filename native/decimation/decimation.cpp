@@ -54,10 +54,12 @@ class Decimation {
   }
 
  private:
-  /// Thorough leaves as many triangles without it, and so does fast where each vertex stays where it was. What a cell
-  /// leaves of a part of the reference is decimated again in the next round, which begins anew by itself.
+  /// Thorough leaves as many triangles without it, and so does fast where each vertex stays where it was. A cell that
+  /// holds only a part of the reference does without it to save time: in a large mesh a later round usually decimates
+  /// again what the first round leaves.
   bool begins_anew(const BoundedMesh& mesh) const {
-    return mesh.certified() && !input_.is_part_of_reference() && options_.effort == DecimationOptions::Effort::fast &&
+    return mesh.certified() && !input_.is_reference_across_cell() &&
+           options_.effort == DecimationOptions::Effort::fast &&
            options_.placement == DecimationOptions::Placement::optimal;
   }
 

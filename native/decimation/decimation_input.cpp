@@ -14,8 +14,6 @@
 namespace tolvol {
 namespace {
 
-constexpr const char* kOutsideCell = "outside the cell";
-
 void check(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const ToleranceVolume* volume,
            const DecimationOptions& options) {
   validate(vertices, triangles);
@@ -100,11 +98,10 @@ void DecimationInput::hold_outside_cell() {
     const auto inside = [&](int k) { return strictly_inside(vertices_[t[k]], *options_.cell); };
     if (inside(0) && inside(1) && inside(2)) continue;
     exempt_[i] = true;
-    pin_corners(i, kOutsideCell);
+    reaches_out_of_cell_ = true;
+    pin_corners(i, "outside the cell");
   }
 }
-
-bool DecimationInput::is_part_of_reference() const { return own_count_ > 0 && report_.locked.contains(kOutsideCell); }
 
 /// Calls visit(input vertex, vertex of the manifold) for all vertices that hold an input vertex: the one that it
 /// became, and those at its place in a face that stands in for a face that was dropped.

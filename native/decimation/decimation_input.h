@@ -48,8 +48,6 @@ class DecimationInput {
   std::span<const glm::uvec3> triangles() const { return triangles_; }
   /// The triangle of the input that one of triangles() is, or is a piece of.
   std::uint32_t parent(std::uint32_t triangle) const { return joined_ ? joined_->parent[triangle] : triangle; }
-  /// Whether the input is the reference and a part of it is held because it lies outside the cell.
-  bool is_part_of_reference() const;
   bool is_piece(std::uint32_t triangle) const { return joined_ && joined_->is_piece[triangle]; }
   /// The barycentric weights of the corners of one of triangles() in its parent, a column for each corner.
   glm::dmat3 weights_in_parent(std::uint32_t triangle) const;
@@ -82,6 +80,8 @@ class DecimationInput {
   /// of the reference and begins with its triangles.
   const std::vector<std::uint32_t>& element_of() const { return element_of_; }
 
+  /// Whether the input begins with the reference and some of its faces are not strictly inside the cell.
+  bool is_reference_across_cell() const { return own_count_ > 0 && reaches_out_of_cell_; }
   /// The corner of triangles(), as 3 * triangle + corner, of a corner of the cut mesh.
   std::uint32_t input_corner(std::uint32_t triangle, int corner) const {
     return 3 * cut_.triangle_input[triangle] + static_cast<std::uint32_t>(own_corner(triangle, corner));
@@ -137,6 +137,7 @@ class DecimationInput {
   /// Triangle i of the input is triangle i of the reference below this number, which is 0 or that of all triangles of
   /// the reference. All others were added, as to close holes. See is_of_reference() for pieces.
   std::size_t own_count_ = 0;
+  bool reaches_out_of_cell_ = false;  ///< Whether some face is not strictly inside the cell.
   double mapping_error_ = 0;
   std::vector<std::uint32_t> element_of_;
   std::optional<TriangleCertificate> forward_;

@@ -18,8 +18,9 @@ TriangleMesh DecimationInput::stored_cut() const {
   return stored;
 }
 
-/// The open edges at which a face that may change can have a T-junction. With a cell they are those whose boxes meet
-/// it: all others are of faces that stay, and most of those are open only because the input is a part of a mesh.
+/// The open edges at which a face that may change can have a T-junction, but for rounding at the sides of a cell. With
+/// a cell they are those whose boxes meet it. All other open edges are of faces that stay, and most of them are open
+/// only because the input is a part of a mesh.
 std::vector<glm::uvec2> DecimationInput::open_edges() const {
   if (!options_.cell) return cut_.boundary;
   std::vector<glm::uvec2> open;

@@ -109,7 +109,7 @@ class Hierarchy {
   using Corners = std::array<glm::dvec3, 3>;
 
   /// A part of a triangle between two lines, each of which is as far from one corner, the hub, on both edges there.
-  /// `from` and `to` are these distances over the longer one of the two edges.
+  /// `from` and `to` are these distances over the longer one of the two edges. By default it is the whole triangle.
   struct Slice {
     float from = 0, to = std::numeric_limits<float>::infinity();
     std::uint32_t hub = 0;
@@ -162,8 +162,9 @@ class Hierarchy {
   std::vector<std::uint32_t> turned_;    // maps a node to its oriented boxes or kNone; it is empty if no node has any
   std::vector<OrientedBoxes> oriented_;  // replace the boxes of some nodes
   std::vector<Corners> corners_;         // are scaled, in the sorted order, with only the first of equal triangles
-  std::vector<Slice> slices_;            // of the triangles that are cut into slices
-  std::vector<std::uint32_t> slice_;     // of each place in the sorted order, or kNone; empty if there are no slices
+  std::vector<Slice> slices_;            // of all triangles that are cut into slices
+  std::vector<std::uint32_t> slice_;     // maps a place in the sorted order to an index in slices_, or to kNone for a
+                                         // whole triangle; empty if there are no slices
   std::vector<std::uint32_t> triangle_;  // maps a place in the sorted order to an index in the mesh
   std::vector<std::uint32_t> place_;     // maps an index in the mesh to a place in the sorted order, of any slice
   std::vector<std::uint32_t> twin_;      // is used by twin(), and empty if no two triangles are equal

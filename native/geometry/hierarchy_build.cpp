@@ -27,7 +27,7 @@ namespace {
 struct Key {
   std::uint64_t code;
   std::uint32_t triangle;
-  std::uint32_t slice = Hierarchy::kNone;  // kNone for all of a triangle
+  std::uint32_t slice = Hierarchy::kNone;  // an index in slices_, or kNone for a whole triangle
 };
 
 /// A corner that at least this many triangles share is a hub.
@@ -88,7 +88,7 @@ struct Hierarchy::Build {
 
   Hierarchy& tree;
   std::vector<Key> keys;
-  std::vector<Outline> outlines{};  // of the slices, local
+  std::vector<Outline> outlines{};  // of slices_, local
   struct Range {
     std::uint32_t begin, end;
   };
@@ -210,14 +210,10 @@ struct Hierarchy::Build {
     for (std::size_t i = 0; i < keys.size(); ++i) {
       poll_at(i);
       const auto& [hub, slices] = hubs[i];
-      if (slices == 1) {
-        all.push_back(keys[i]);
-        continue;
-      }
       const glm::uvec3& t = mesh.triangles[keys[i].triangle];
       const Corners corners{tree.scaled(mesh.vertices[t.x]), tree.scaled(mesh.vertices[t.y]),
                             tree.scaled(mesh.vertices[t.z])};
-      if (!(Legs(corners, hub).longer() > 0)) {  // It is a point.
+      if (slices == 1 || !(Legs(corners, hub).longer() > 0)) {  // A point stays whole, too.
         all.push_back(keys[i]);
         continue;
       }
@@ -285,7 +281,7 @@ struct Hierarchy::Build {
     }
   }
 
-  /// Makes box i hold a range, and returns half its area.
+  /// Makes box i of some boxes hold the triangles and slices of a range. Returns half the area of the box.
   double fit(OrientedBoxes& boxes, int i, Range range) const {
     const std::size_t count = range.end - range.begin;
     const auto begin = keys.begin() + range.begin, end = keys.begin() + range.end;

@@ -186,7 +186,7 @@ class MovingMesh {
   StoredSpace space_;
   std::span<const std::uint32_t> faces_;
   std::size_t corners_;
-  unsigned threads_;
+  unsigned threads_;                              ///< The number of threads to use, never 0.
   std::vector<std::uint32_t> ring_start_, ring_;  // They map each vertex to its faces.
   std::vector<bool> frozen_;
   bool any_frozen_ = false;

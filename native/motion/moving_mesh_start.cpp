@@ -39,7 +39,7 @@ MovingMesh::MovingMesh(const ToleranceVolume& volume, const StoredSpace& space, 
       space_(space.in(volume.frame())),
       faces_(faces),
       corners_(static_cast<std::size_t>(corners)),
-      threads_(threads) {
+      threads_(thread_count(threads)) {
   if (corners < 1 || corners > 4) throw InvalidInput("a face must have 1 to 4 corners; triangulate larger ones");
   if (faces.size() % corners_ != 0) throw InvalidInput("the face array is not a whole number of faces");
   require_vertices(faces, corners_, vertex_count);

@@ -21,7 +21,7 @@ import meshes
 from commands import ENVIRONMENT, assert_within, command, read, refused, scan, succeeded, words, write
 
 TOLERANCE = 0.02
-SMALL = f"{plan.FIXED + 800 * plan.OF_FIRST}"  # bytes, for at most 800 triangles in a cell
+SMALL = f"{plan.FIXED + 800 * plan.OF_FIRST_IF_SHORT}"  # bytes, for at most 800 triangles in a cell
 
 
 @pytest.fixture
@@ -113,7 +113,7 @@ def test_only_the_same_run_goes_on(torus, tmp_path):
     out = tmp_path / "out.ply"
     folder = interrupted(torus, out, "round0_00001")
     refused(decimate(torus, out), folder, "go on with --resume, or remove the folder")
-    larger = str(int(SMALL) + 500 * plan.OF_FIRST)
+    larger = str(int(SMALL) + 500 * plan.OF_FIRST_IF_SHORT)
     refused(decimate(torus, out, "--resume", memory=larger), "--memory was", "run again as before", folder)
     refused(decimate(torus, out, "--resume", "--effort", "thorough"), "--effort was fast and is thorough now")
     os.utime(torus, (1, 1))

@@ -350,12 +350,21 @@ def test_there_are_no_cells_for_a_later_round_that_cannot_fit_the_memory(tmp_pat
     assert planned.needed([crowded]) == plan.FIXED + mesh.count * plan.OF_REFERENCE + 2000 * plan.OF_MESH
 
 
+def test_a_short_tolerance_needs_more_memory(tmp_path):
+    mesh = MappedMesh(written(tmp_path / "a.ply", *noisy()))
+
+    def count(tolerance):
+        return len(plan.Plan(mesh, tolerance, plan.FIXED + mesh.count * plan.OF_FIRST).first.boxes)
+
+    assert count(0.02) == 1 and count(0.01) > 1
+
+
 def test_too_little_memory_is_refused_with_what_is_needed(tmp_path):
     mesh = MappedMesh(written(tmp_path / "a.ply", *noisy()))
     with pytest.raises(Refused, match=r"--memory: 1 MB is too little: .* need at least \d+ MB"):
         plan.Plan(mesh, 0.1, 1_000_000)
     with pytest.raises(Refused, match="--memory"):
-        plan.Plan(mesh, 1.0, plan.FIXED + 100 * plan.OF_FIRST_IF_SHORT)
+        plan.Plan(mesh, 1.0, plan.FIXED + 100 * plan.OF_FIRST)
 
 
 @pytest.mark.parametrize("count", [2, 3, 4, 7])
@@ -397,7 +406,7 @@ def test_triangles_that_reach_into_many_cells_need_memory_in_each(tmp_path):
 def test_hopelessly_little_memory_for_many_triangles_is_refused_after_few_tries(tmp_path, monkeypatch):
     mesh, made = MappedMesh(written(tmp_path / "a.ply", *meshes.plate(n=257))), []
     monkeypatch.setattr(plan, "Cells", lambda points, count, turn: made.append(count) or Cells(points, count, turn))
-    for tolerance, memory in ((0.001, 1_000_000), (0.5, plan.FIXED + 100 * plan.OF_FIRST_IF_SHORT)):
+    for tolerance, memory in ((0.001, 1_000_000), (0.5, plan.FIXED + 100 * plan.OF_FIRST)):
         with pytest.raises(Refused, match="--memory"):
             plan.Plan(mesh, tolerance, memory)
     assert sum(made) < mesh.count / 8  # Cells of a triangle each would take minutes.
@@ -408,7 +417,7 @@ def test_hopelessly_little_memory_for_many_triangles_is_refused_after_few_tries(
 
 def test_a_run_that_goes_on_does_no_finished_step_again(tmp_path):
     mesh = MappedMesh(written(tmp_path / "a.ply", *noisy()))
-    planned = plan.Plan(mesh, 0.02, plan.FIXED + 2000 * plan.OF_FIRST_IF_SHORT)
+    planned = plan.Plan(mesh, 0.02, plan.FIXED + 2000 * plan.OF_FIRST)
     done = []
 
     def run(last):
@@ -438,7 +447,7 @@ def test_a_run_that_goes_on_does_no_finished_step_again(tmp_path):
 def test_there_are_at_most_six_rounds_and_more_memory_is_proposed(tmp_path, monkeypatch):
     vertices, triangles = noisy()
     mesh = MappedMesh(written(tmp_path / "a.ply", vertices, triangles))
-    planned = plan.Plan(mesh, 0.02, plan.FIXED + 2000 * plan.OF_FIRST_IF_SHORT)
+    planned = plan.Plan(mesh, 0.02, plan.FIXED + 2000 * plan.OF_FIRST)
     monkeypatch.setattr("tolvol.tiles.rounds._LEAST_GAIN", -1)  # Each round is worth another.
 
     def each(stage, title, work, jobs):

@@ -12,7 +12,7 @@ from tolvol.tiles import plan
 
 from commands import ENVIRONMENT, command, refused, scan, succeeded, words
 
-SMALL = f"{plan.FIXED + 800 * plan.OF_FIRST}"  # bytes, for at most 800 triangles in a cell
+SMALL = f"{plan.FIXED + 800 * plan.OF_FIRST_IF_SHORT}"  # bytes, for at most 800 triangles in a cell
 
 
 @pytest.fixture(scope="module")

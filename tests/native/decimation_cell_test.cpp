@@ -5,6 +5,7 @@
 #include <array>
 #include <limits>
 #include <map>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -164,6 +165,27 @@ TEST(DecimationCell, HoldsWhatCoversTheRestOfAPiece) {
   const Soup result = round(mesh, reference, kTolerance, halves(0, 0), {.max_normal_angle = 180});
   expect_within(result, reference, kTolerance);
   EXPECT_LT(result.size(), mesh.size()) << "the far rim is free";
+}
+
+// Locked vertices outside the cell are held for another cause, and are outside it all the same.
+TEST(DecimationCell, DoesNotBeginAnewWithAPartOfTheReference) {
+  const TriangleMesh torus = shapes::torus(across(80), 0.004);
+  const ToleranceVolume volume(torus.vertices, torus.triangles, space(), 0.02);
+  std::vector<double> lowest;
+  for (const dvec3& p : torus.vertices) lowest.push_back(p.x);
+  std::ranges::sort(lowest);
+  const auto left = [&](double from, bool is_locked) {
+    DecimationOptions options;
+    options.cell = halves(0, from).back();
+    const auto locked = std::make_unique<bool[]>(torus.vertices.size());
+    std::ranges::transform(torus.vertices, locked.get(),
+                           [&](const dvec3& p) { return !strictly_inside(p, *options.cell); });
+    if (is_locked) options.locked = {locked.get(), torus.vertices.size()};
+    return decimate(torus.vertices, torus.triangles, space(), &volume, options).triangles.size();
+  };
+  const double beside_one = (lowest[0] + lowest[1]) / 2;
+  EXPECT_GT(left(beside_one, false), left(-kFar, false) + 10) << "a second pass removes some per cent more";
+  EXPECT_EQ(left(beside_one, true), left(beside_one, false));
 }
 
 /// Two plates of squares meet at x = 0. Each edge of the coarse one has a vertex of the fine one at its middle.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <numeric>
+#include <tuple>
 #include <vector>
 
 #include "check/coverage.h"
@@ -27,6 +28,32 @@ TEST(FindWitnesses, TakesFacesAtAHubWhole) {
   std::size_t pieces = 0;
   for (const std::uint32_t face : all) pieces += coverage.piece_count(face);
   EXPECT_EQ(pieces, all.size()) << "no face is cut";
+}
+
+// Some triangles have one witness, some are divided among several, and some are out of reach.
+TEST(FindWitnesses, ThreadsDoNotChangeABit) {
+  constexpr double kLimit = 0.002;
+  const TriangleMesh reference = shapes::sphere(80);
+  TriangleMesh mesh = shapes::sphere(20);
+  mesh.triangles.pop_back();
+  ASSERT_GT(reference.triangles.size(), std::size_t{1} << 16);
+  std::vector<std::uint32_t> all(reference.triangles.size()), faces(mesh.triangles.size());
+  std::iota(all.begin(), all.end(), 0u), std::iota(faces.begin(), faces.end(), 0u);
+  const auto found = [&](unsigned threads) {
+    Team team(threads);
+    Coverage coverage(reference, kLimit, faces.size());
+    const Coverage::Uncovered uncovered = coverage.find_witnesses(all, mesh, faces, kLimit, team, nullptr);
+    std::vector<std::size_t> pieces;
+    for (const std::uint32_t face : faces) pieces.push_back(coverage.piece_count(face));
+    return std::tuple(uncovered.triangles, uncovered.nearest, uncovered.in_part.size(), pieces);
+  };
+  const auto alone = found(1);
+  EXPECT_GT(std::get<0>(alone).size(), 0u) << "some are out of reach";
+  EXPECT_LT(std::get<0>(alone).size(), all.size());
+  EXPECT_GT(std::accumulate(std::get<3>(alone).begin(), std::get<3>(alone).end(), std::size_t{0}),
+            all.size() - std::get<0>(alone).size())
+      << "some are divided";
+  EXPECT_EQ(found(4), alone);
 }
 
 }  // namespace

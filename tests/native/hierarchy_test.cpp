@@ -189,6 +189,28 @@ TEST(Hierarchy, LooksAtFewNearTheHubOfUnequalEdges) {
 }
 
 // All triangles around a vertex are at distance 0 from it, and boxes rounded the wrong way would lose some.
+TEST(Hierarchy, AgreesWhereOnlySomeTrianglesAreCutIntoSlices) {
+  TriangleMesh mesh = shapes::joined(needles(300, true), soup(21, 500));
+  mesh.triangles.push_back({300, 300, 300});  // a point at the hub
+  const Hierarchy hierarchy(mesh);
+  shapes::Random random(22);
+  for (int i = 0; i < 1000; ++i) {
+    const double off = std::array{0.0, 1e-6, 1e-2, 1.0}[i % 4];
+    const dvec3 p = mesh.vertices[random.below(1800)] + off * random.point();
+    const Hierarchy::Nearest expected = brute(mesh, p, kInfinity, all), found = hierarchy.nearest(p);
+    ASSERT_EQ(found.triangle, expected.triangle) << i;
+    ASSERT_EQ(found.distance, expected.distance);
+    std::vector<int> seen(mesh.triangles.size());
+    hierarchy.for_each_within(p, 0.1, [&](std::uint32_t t) { ++seen[t]; });
+    for (std::uint32_t t = 0; t < seen.size(); ++t) {
+      ASSERT_LE(seen[t], 1);
+      if (std::sqrt(closest(mesh, t, p).distance_squared) <= 0.1) {
+        ASSERT_EQ(seen[t], 1);
+      }
+    }
+  }
+}
+
 TEST(Hierarchy, AgreesAtSharedVertices) {
   shapes::Random random(19);
   TriangleMesh mesh;

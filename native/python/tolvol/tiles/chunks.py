@@ -14,19 +14,22 @@ from ..shared.errors import NotWritten, Refused
 from ..welding import welded
 from .cells import Box
 
-_BLOCK = 1 << 16  # triangles
-_COUNTS = np.dtype("<i8")  # of the vertices and the triangles of a block, which its arrays follow
+_AT_ONCE = 1 << 16  # triangles whose corners are looked at together
+_COUNTS = np.dtype("<i8")  # A block begins with the number of its vertices and that of its triangles.
 _INDEX = np.dtype("<i4")
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """A file of blocks: two counts, the vertices, float32 or float64, and the triangles as indices of vertices of the block."""
+    """A file of blocks. Each has two counts, its vertices, and its triangles by the numbers of their corners among these (int32).
+
+    dtype: of the vertices, float32 or float64; count: the number of triangles. Without triangles there is no block.
+    """
 
     path: str
     dtype: str
-    count: int  # of triangles
+    count: int
     bounds: Box
     checksum: int
 
@@ -72,7 +75,7 @@ class Writer:
         self._write(b"", "wb")
 
     def _write(self, data, mode="ab"):
-        # The file is closed between two parts, because there may be more chunks than files that can be open at once.
+        # The file is closed between two blocks, because there may be more chunks than files that can be open at once.
         try:
             with open(self._partial, mode) as file:
                 file.write(data)
@@ -80,7 +83,7 @@ class Writer:
             raise failed(error, self._path) from None
 
     def add(self, corners):
-        """Adds triangles, (k, 3, 3)."""
+        """Adds a block of triangles, (k, 3, 3), all of one dtype; adds nothing for none."""
         if not len(corners):
             return
         vertices, triangles = mesh_of(corners.astype(corners.dtype.newbyteorder("<"), copy=False))
@@ -133,9 +136,9 @@ def bounds_of(points):
 
 
 def gather(chunks, box):
-    """Returns (vertices, triangles): all triangles of some chunks whose bounding box meets a box, in the order of the chunks.
+    """Returns (vertices, triangles): the triangles of some chunks, in their order, whose own bounding box meets a box.
 
-    Each position has one vertex.
+    Each position has one vertex, and each vertex is used.
     """
     parts = []
     for chunk in chunks:
@@ -153,13 +156,16 @@ def gather(chunks, box):
 
 
 def of_corners(vertices, triangles, tell):
-    """Returns, (k,), what tell(corners, (j, 3, 3)) finds of triangles, (k, 3) indices. It looks at a part of them at once."""
-    found = [tell(vertices[triangles[at : at + _BLOCK]]) for at in range(0, len(triangles), _BLOCK)]
+    """Returns tell(corners), (k,) bool, for triangles, (k, 3) indices.
+
+    tell gets (j, 3, 3) at a time, so that the corners of all triangles are never in memory together.
+    """
+    found = [tell(vertices[triangles[at : at + _AT_ONCE]]) for at in range(0, len(triangles), _AT_ONCE)]
     return np.concatenate(found) if found else np.zeros(0, bool)
 
 
 def selected(vertices, triangles, chosen):
-    """Returns (vertices, triangles): those of the triangles that are chosen, (k,) bool, and the vertices that they use."""
+    """Returns (vertices, triangles): the triangles for which chosen, (k,) bool, holds, and the vertices that they use."""
     triangles = triangles[chosen]
     used = np.zeros(len(vertices), bool)
     used[triangles] = True
@@ -168,7 +174,7 @@ def selected(vertices, triangles, chosen):
 
 
 def joined(meshes):
-    """Returns (vertices, triangles) of some meshes together, whose vertices stay apart."""
+    """Returns (vertices, triangles) of some meshes together, whose vertices stay apart. They are fewer than 2**31."""
     if not meshes:
         return np.empty((0, 3), np.float32), np.empty((0, 3), np.int32)
     firsts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes)])

@@ -9,11 +9,11 @@ import numpy as np
 from ..shared.errors import Refused
 from .cells import Box, Cells, centroids, lowest_and_highest
 
-# What the work in a cell takes at its peak, in bytes (docs/benchmark.md): by itself; in the first round, where the mesh is the
-# reference, for each of its triangles; the same where the tolerance is short, because more triangles of the reference are cut
-# into pieces then; and in later rounds, for each triangle of the reference and for each of the mesh.
+# What the work in a cell takes at its peak, in bytes (docs/benchmark.md). FIXED: by itself. OF_FIRST: for each triangle in the
+# first round, where the mesh is the reference. OF_FIRST_IF_SHORT: in place of OF_FIRST where the tolerance is short, because
+# more triangles of the reference are cut into pieces then. OF_REFERENCE, OF_MESH: for each triangle of these in later rounds.
 FIXED, OF_FIRST, OF_FIRST_IF_SHORT, OF_REFERENCE, OF_MESH = 160 << 20, 1000, 1800, 400, 2200
-_SHORT = 1 / 4  # of the median edge
+_SHORT = 1 / 4  # A tolerance below this share of the median edge is short.
 # This share of the memory beside FIXED may be the grid of distances.
 OF_GRID = 1 / 7
 
@@ -127,7 +127,8 @@ class _Load:
 
 def _median_edge(corners):
     """Returns the median length of the edges of triangles, (k, 3, 3)."""
-    return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
+    edges = corners.astype(np.float64) - np.roll(corners, 1, axis=1)
+    return float(np.median(np.linalg.norm(edges, axis=2)))
 
 
 def _samples(mesh):

@@ -51,7 +51,8 @@ def bounds(mesh):
 def needed_space(mesh):
     """Returns the bytes that a run takes of the scratch folder at its peak, at most.
 
-    They are the chunks of the reference, which overlap nowhere, those of the present mesh, and those that replace them.
+    They are the chunks of the reference, which overlap nowhere, those of the present mesh, and those that replace them. The
+    records of the steps, and 16 bytes for each block of a chunk, come on top.
     """
     of_triangle = 9 * mesh.dtype.itemsize + 3 * 4  # where no vertex is shared
     return 3 * mesh.count * of_triangle

@@ -37,8 +37,8 @@ def decimate(tile, output, progress=None):
     """
     vertices, triangles = chunks.gather(tile.mesh, tile.cell)
     inside = chunks.of_corners(vertices, triangles, tile.cell.strictly_holds_triangles)
-    outside = vertices[triangles[~inside]]
-    owned = outside[tile.cell.holds(centroids(outside))]
+    rest = vertices[triangles[~inside]]
+    owned = rest[tile.cell.holds(centroids(rest))]
     decimated = (
         _decimated(tile, vertices, triangles, inside, progress) if _has_area(vertices, triangles[inside]) else None
     )
@@ -89,7 +89,7 @@ def _largest(those, others, tile, threads, progress):
     vertices, triangles = chunks.gather(those, tile.cell)
     rounding = clipping.rounding(vertices)
     box = tile.cell.grown(rounding)
-    # Clipping would give these back as they are.
+    # Clipping would give the triangles inside back as they are.
     inside = chunks.of_corners(vertices, triangles, tile.cell.strictly_holds_triangles)
     rest = vertices[triangles[~inside]]
     vertices, triangles = chunks.selected(vertices, triangles, inside)
