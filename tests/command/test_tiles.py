@@ -257,6 +257,21 @@ def test_the_results_of_cells_are_one_mesh_within_the_tolerance(tmp_path, kind):
             assert lower <= exact.upper and exact.lower <= upper <= tolerance * (1 + 1e-6)
 
 
+@pytest.mark.parametrize("memory", [plan.FIXED + 800 * plan.OF_FIRST, 1_000_000_000])
+def test_a_mesh_far_from_the_origin_is_proved(tmp_path, memory):
+    vertices, triangles = noisy()
+    mesh = MappedMesh(written(tmp_path / "a.ply", vertices + 5e6, triangles, np.float64))
+
+    def each(stage, title, work, jobs):
+        for job in jobs:
+            yield work(job, None)
+
+    folder = Scratch(tmp_path / "scratch", {}, resume=False)
+    found = Rounds(mesh, plan.Plan(mesh, 0.02, memory), folder, 0.02, OPTIONS, each).run()
+    folder.close(discard=True)
+    assert found.forward.upper <= 0.02 and found.backward.upper <= 0.02 and len(found.triangles) < len(triangles) / 6
+
+
 def test_a_mesh_that_moved_is_seen_by_measuring_in_cells(tmp_path):
     vertices, triangles = meshes.torus()
     corners = vertices[triangles]

@@ -108,6 +108,37 @@ def test_fewer_triangles_at_a_larger_tolerance():
     assert counts == sorted(counts, reverse=True) and len(set(counts)) == 4
 
 
+def test_thorough_holds_the_copies_of_a_vertex_that_is_held():
+    # Two fans touch at vertex 10. A collapse of one of them into a locked vertex holds the other there, too.
+    vertices = np.array(
+        [
+            (0.171646, 13.116886, 4e-06), (0.085539, 13.733623, 1e-06), (0.25786, 13.730727, 0), (0.430663, 13.741346, -2e-06),
+            (-0.000823, 13.732646, -2e-06), (0.087057, 14.362001, -4e-06), (0.171632, 14.35459, 4e-06),
+            (0.34503, 14.360299, 1e-06), (0.516348, 14.674249, -1.9e-05), (0.085859, 14.980633, 4e-06),
+            (0.171765, 14.982955, -5e-06), (0.429601, 14.985366, 2e-06), (0.171821, 15.606445, -4e-06),
+        ]
+    )  # fmt: skip
+    triangles = np.array(
+        [
+            (0, 2, 1),
+            (4, 1, 5),
+            (1, 2, 6),
+            (2, 3, 7),
+            (2, 7, 6),
+            (3, 8, 7),
+            (4, 5, 9),
+            (5, 6, 10),
+            (10, 11, 12),
+            (5, 10, 9),
+        ]
+    )
+    tolerance = 0.04893939530858255
+    volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
+    locked = np.isin(np.arange(13), [0, 1, 2, 10, 11, 12])
+    result = tolvol.decimate(vertices, triangles, volume, effort="thorough", locked=locked)
+    assert tolvol.hausdorff(result.vertices, result.triangles, vertices, triangles).upper <= tolerance
+
+
 def test_no_crack_opens_between_the_triangles_of_a_soup():
     vertices, triangles = meshes.soup(*meshes.torus(64, 32))
     result = decimate(vertices, triangles, 0.01 * tolvol.diagonal(vertices, triangles))

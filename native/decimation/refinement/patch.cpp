@@ -98,7 +98,13 @@ void Patch::free_vertices(const Change& collapse, bool boundary_free) {
   kept.joined = kept.joined || mesh_->joined(mesh_->from(collapse.halfedge()));
   // Copies that are carried along do not move any further, so that the vertex to which they are carried must not.
   if (!collapse.carried().empty()) kept.free = false;
-  for (const std::uint32_t v : collapse.carried()) place(v);
+  for (const std::uint32_t v : collapse.carried()) {
+    place(v);
+    // It becomes a copy of the vertex that stays, and what holds for a vertex holds for its copies.
+    Vertex& carried = vertices_[find_vertex(v)];
+    carried.pinned = carried.pinned || kept.pinned;
+    carried.share = std::min(carried.share, kept.share);
+  }
   for (const std::uint32_t v : collapse.moved_along()) place(v);
   for (const Change::NewWedge& n : collapse.new_wedges()) {
     const std::uint32_t f = find_face(n.triangle);

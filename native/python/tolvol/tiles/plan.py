@@ -12,7 +12,7 @@ from .cells import Box, Cells, centroids, lowest_and_highest
 # What the work in a cell takes at its peak, in bytes (docs/benchmark.md). FIXED: by itself. OF_FIRST: for each triangle in the
 # first round, where the mesh is the reference. OF_FIRST_IF_SHORT: in place of OF_FIRST where the tolerance is short, because
 # more triangles of the reference are cut into pieces then. OF_REFERENCE, OF_MESH: for each triangle of these in later rounds.
-FIXED, OF_FIRST, OF_FIRST_IF_SHORT, OF_REFERENCE, OF_MESH = 160 << 20, 1000, 1800, 400, 2200
+FIXED, OF_FIRST, OF_FIRST_IF_SHORT, OF_REFERENCE, OF_MESH = 160 << 20, 1000, 1800, 460, 2200
 _SHORT = 1 / 4  # A tolerance below this share of the median edge is short.
 # This share of the memory beside FIXED may be the grid of distances.
 OF_GRID = 1 / 7
@@ -40,8 +40,8 @@ class Plan:
         cells, needed = self._fewest([self._reference], 0)
         if not cells:
             raise Refused(
-                f"--memory: {memory / 1e6:,.0f} MB is too little: the triangles within the tolerance of one place need at "
-                f"least {(FIXED + needed) / 1e6:,.0f} MB"
+                f"--memory: {memory // 1_000_000:,} MB is too little: the triangles within the tolerance of one place need at "
+                f"least {math.ceil((FIXED + needed) / 1e6):,} MB"
             )
         self.first = cells
 

@@ -14,7 +14,7 @@ from functools import reduce
 import numpy as np
 
 from ..shared.proof.verdict import Interval
-from . import chunks, scratch, tile
+from . import chunks, clipping, scratch, tile
 from .cells import EVERYWHERE, Box, centroids
 from .chunks import Chunk
 from .tile import Tile
@@ -72,6 +72,9 @@ class Rounds:
     def run(self):
         """Returns the Result. Raises NotWritten where the scratch folder is full, after which the run can go on."""
         reference = present = self._reference()
+        corners = np.array([corner for chunk in reference for corner in (chunk.bounds.lower, chunk.bounds.upper)])
+        # Far from the origin the measuring of clipped triangles adds more than the headroom of a decimation.
+        shorter = max(self._tolerance - 4 * clipping.loss(corners), self._tolerance / 2)
         made, angles, warnings, boxes = [], [0.0], {}, None
         for number in range(_MOST_ROUNDS):
             wanted = self._boxes(number, present, made)
@@ -80,7 +83,7 @@ class Rounds:
             boxes = wanted
             # The first of several rounds leaves so many triangles between the cells that a thorough search is in vain.
             options = self._options if number or len(boxes) == 1 else {**self._options, "effort": "fast"}
-            like = Tile(None, present, reference, self._tolerance, options, self._plan.grid_memory())
+            like = Tile(None, present, reference, shorter, options, self._plan.grid_memory())
             done = self._steps("decimation", f"round {number + 1}", f"round{number}", decimate, like, boxes)
             before, present = present, tuple(Chunk.read_from(record["chunk"]) for record in done)
             if before != reference:

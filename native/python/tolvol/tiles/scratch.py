@@ -18,6 +18,7 @@ from ..shared.errors import Refused
 from . import chunks
 
 _ASKED = "run"
+_FORMAT = 2  # A run with other files in its folder cannot go on with these.
 
 
 class Scratch:
@@ -43,6 +44,7 @@ class Scratch:
             raise
 
     def _take(self, asked, resume):
+        asked = {"the format of the scratch folder": _FORMAT, **asked}
         with contextlib.suppress(ImportError):  # Windows has no fcntl.
             import fcntl
 

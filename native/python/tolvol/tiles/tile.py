@@ -87,7 +87,7 @@ def measure(tile, progress=None):
 
 def _largest(those, others, tile, threads, progress):
     vertices, triangles = chunks.gather(those, tile.cell)
-    rounding = clipping.rounding(vertices)
+    rounding, loss = clipping.rounding(vertices), clipping.loss(vertices)
     box = tile.cell.grown(rounding)
     # Clipping would give the triangles inside back as they are.
     inside = chunks.of_corners(vertices, triangles, tile.cell.strictly_holds_triangles)
@@ -98,16 +98,17 @@ def _largest(those, others, tile, threads, progress):
     shallow = clipping.are_shallow(rest, tile.cell, rounding)
     clipped = np.concatenate([clipping.clipped(rest[~shallow], tile.cell), clipping.clipped(rest[shallow], box)])
     vertices, triangles = chunks.joined([(vertices, triangles), chunks.mesh_of(clipped)])
-    rounding *= clipping.STEEP_LOSS
     if not len(triangles):
         return 0.0, 0.0
     around = chunks.gather(others, box.grown(tile.tolerance))
     if not len(around[1]):
         return tile.tolerance, np.inf
+    # The search ends below the bound, and what is added must not exceed the tolerance.
+    bound = max(tile.tolerance - 2 * loss, 0.0)
     found = package.module.directed_hausdorff(
-        vertices, triangles, *around, bound=tile.tolerance, threads=threads, progress=progress
+        vertices, triangles, *around, bound=bound, threads=threads, progress=progress
     )
-    return max(found.lower - rounding, 0.0), found.upper + rounding
+    return max(found.lower - loss, 0.0), found.upper + loss
 
 
 def _has_area(vertices, triangles):
