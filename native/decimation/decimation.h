@@ -38,6 +38,7 @@ struct DecimationOptions {
   /// For each input vertex, or empty: it neither moves nor vanishes, and an edge between two such vertices stays.
   std::span<const bool> locked = {};
   /// For each input vertex, or empty: the share of the tolerance, 0 to 1, that the new faces around it may use.
+  /// A face that does not change when a vertex of a smaller share becomes one with its corner may keep what it uses.
   std::span<const double> shares = {};
   Outside outside = Outside::error;            ///< What happens to input faces that are not within the tolerance.
   std::span<const std::uint32_t> wedges = {};  ///< For each input corner, or empty: see wedge_labels().

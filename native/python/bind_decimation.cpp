@@ -237,7 +237,8 @@ target_triangles : int, optional
 locked : (n,) bool array, optional
     Vertices that neither move nor vanish. An edge between two of them stays.
 shares : (n,) float64 array, optional
-    From 0 to 1: the share of the tolerance that the new faces around a vertex may use.
+    From 0 to 1: the share of the tolerance that the new faces around a vertex may use. A face that is there already when
+    a vertex of a smaller share becomes one with a corner of it, and that does not change by that, may keep what it uses.
 outside : {"error", "keep"}
     What happens if input faces are not within the tolerance: an error, or they stay as they are.
 wedges : (m, 3) integer array, optional

@@ -214,6 +214,14 @@ def test_a_damaged_chunk_is_named(tmp_path):
         chunks.gather([chunk], EVERYWHERE)
 
 
+def test_a_folder_with_files_of_another_format_is_refused(tmp_path, monkeypatch):
+    Scratch(tmp_path / "scratch", {"IN": "a.ply"}, resume=False).close(discard=False)
+    Scratch(tmp_path / "scratch", {"IN": "a.ply"}, resume=True).close(discard=False)
+    monkeypatch.setattr("tolvol.tiles.scratch._FORMAT", 99)
+    with pytest.raises(Refused, match="the format of the scratch folder was 2 and is 99 now"):
+        Scratch(tmp_path / "scratch", {"IN": "a.ply"}, resume=True)
+
+
 # A cell ---------------------------------------------------------------------------------------------------------------
 
 

@@ -79,7 +79,8 @@ def add(parser):
         type=file_name,
         metavar="DIR",
         help="the folder for temporary files, new or empty: at most 144 bytes for each triangle of IN, or 252 for "
-        "float64, and a third of that where nearly all vertices are shared (default: OUT.tolvol beside OUT). It is removed at the end",
+        "float64, and a third of that where nearly all vertices are shared (default: OUT.tolvol beside OUT). It is "
+        "removed at the end",
     )
     group.add_argument(
         "--scheduler",

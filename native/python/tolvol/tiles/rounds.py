@@ -21,7 +21,7 @@ from .tile import Tile
 
 _MOST_ROUNDS = 6
 _PARTS = 8  # chunks of the reference for each cell of the first round
-# There is no further round of several cells after one that removes a smaller share of the triangles.
+# A round that removes a smaller share of the triangles is the last one, unless the next is the first with a single cell.
 _LEAST_GAIN = 0.02
 
 
@@ -138,12 +138,13 @@ class Rounds:
             return [Box(*map(tuple, box)) for box in record["boxes"]]
         if not number:
             cells = self._plan.first
-        elif made[-1][0] == 1:
+        elif number == 1 and made[0][0] == 1:
             return None
         else:
             cells = self._plan.later(present, number)
             is_vain = len(made) > 1 and made[-1][1] > (1 - _LEAST_GAIN) * made[-2][1]
-            if not cells or (is_vain and len(cells.boxes) > 1):
+            # The first round with a single cell is never in vain.
+            if not cells or (is_vain and (len(cells.boxes) > 1 or made[-1][0] == 1)):
                 return None
         self._scratch.keep(f"cells{number}", {"boxes": [(box.lower, box.upper) for box in cells.boxes]})
         return cells.boxes
