@@ -96,7 +96,8 @@ class TriangleCertificate {
                                           const glm::uvec3& hints = glm::uvec3(Hierarchy::kNone)) const;
 
   /// The point of the reference that is nearest to p among the triangles that the grid's nodes around p name. Where the
-  /// reference is far from p, it may have a nearer point; that is rare.
+  /// reference is far from p, it may have a nearer point; that is rare. Where the nodes are several tolerances apart,
+  /// it is the nearest point of all.
   std::optional<glm::dvec3> nearby_point(const glm::dvec3& p) const;
   /// The point of the reference that is nearest to p, at most `radius` away, among the triangles that `facing` admits,
   /// or among all if it is null.

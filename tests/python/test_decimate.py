@@ -108,6 +108,18 @@ def test_fewer_triangles_at_a_larger_tolerance():
     assert counts == sorted(counts, reverse=True) and len(set(counts)) == 4
 
 
+@pytest.mark.parametrize("precision", [1 / 4, 1 / 8])
+def test_a_coarse_grid_leaves_as_few_triangles(precision):
+    vertices, triangles = meshes.torus(160, 80, noise=0.002)
+    tolerances = tolvol.diagonal(vertices, triangles) * np.linspace(0.0096, 0.0104, 5)
+
+    def left(precision):
+        volumes = [tolvol.ToleranceVolume(vertices, triangles, t, precision=precision) for t in tolerances]
+        return sum(len(tolvol.decimate(vertices, triangles, volume).triangles) for volume in volumes)
+
+    assert left(precision) <= 1.03 * left(1)
+
+
 def test_thorough_holds_the_copies_of_a_vertex_that_is_held():
     # Two fans touch at vertex 10. A collapse of one of them into a locked vertex holds the other there, too.
     vertices = np.array(
