@@ -18,7 +18,6 @@
 #include <span>
 #include <vector>
 
-#include "base/parallel.h"
 #include "base/progress.h"
 #include "check/part.h"
 #include "check/piece_list.h"
@@ -27,6 +26,8 @@
 #include "geometry/triangle_mesh.h"
 
 namespace tolvol {
+
+class Team;
 
 class Coverage {
  public:

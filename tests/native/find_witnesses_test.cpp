@@ -6,6 +6,7 @@
 #include <tuple>
 #include <vector>
 
+#include "base/parallel.h"
 #include "check/coverage.h"
 #include "shapes.h"
 
