@@ -57,30 +57,18 @@ def _between(upper, above, lower, below):
     """
     inner, outer = min(above, below) // 4, max(above, below) // 4
     short, of_short, long, of_long = (upper, above, lower, below) if above < below else (lower, below, upper, above)
-    sector = np.arange(4)[:, None]
+    sector, inward, outward = np.arange(4)[:, None], np.arange(inner), np.arange(outer)
 
-    def place(first, size, row, step):
-        return first + (sector * row + step) % size
+    def near(step):
+        return short + (sector * inner + step) % of_short
 
-    step, further = np.arange(outer), np.arange(inner)
-    found = [
-        np.stack(
-            [
-                place(short, of_short, inner, step),
-                place(long, of_long, outer, step),
-                place(long, of_long, outer, step + 1),
-            ],
-            2,
-        ),
-        np.stack(
-            [
-                place(short, of_short, inner, further),
-                place(long, of_long, outer, further + 1),
-                place(short, of_short, inner, further + 1),
-            ],
-            2,
-        ),
-    ]
+    def far(step):
+        return long + (sector * outer + step) % of_long
+
+    found = (
+        np.stack([near(outward), far(outward), far(outward + 1)], 2),
+        np.stack([near(inward), far(inward + 1), near(inward + 1)], 2),
+    )
     corners = np.concatenate([part.reshape(-1, 3) for part in found])
     return corners if above < below else corners[:, ::-1]
 

@@ -42,7 +42,7 @@ constexpr double kProbeSpacing = 2.0;
 // Probes divide an edge into at most this many steps.
 constexpr int kMostProbes = 8;
 // Where nodes are farther apart than this, their triangles are too far from the point nearest to a place between them:
-// decimation left a tenth more faces. The search takes twice as long as all else in a decimation with a grid so coarse.
+// decimation left a tenth more faces. With a search in their place it takes up to a third longer.
 constexpr double kCoarse = 3.0;
 // A piece shorter than this is tried against the triangles of all eight nodes around its centre.
 constexpr double kSmall = 2.0;

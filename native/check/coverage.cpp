@@ -90,7 +90,7 @@ void Coverage::set_witness(std::uint32_t element, std::uint32_t triangle) {
 }
 
 Coverage::Uncovered Coverage::find_witnesses(std::span<const std::uint32_t> triangles, const TriangleMesh& mesh,
-                                             std::span<const std::uint32_t> ids, double provable, Team& team,
+                                             std::span<const std::uint32_t> ids, double provable, unsigned threads,
                                              Progress* progress) {
   if (mesh.triangles.empty()) return {{triangles.begin(), triangles.end()}, {}, {}};
   const Hierarchy hierarchy(mesh);
@@ -99,7 +99,7 @@ Coverage::Uncovered Coverage::find_witnesses(std::span<const std::uint32_t> tria
   for (std::size_t first = 0; first < triangles.size(); first += kSearchedAtOnce) {
     const std::span<const std::uint32_t> part =
         triangles.subspan(first, std::min(common.size(), triangles.size() - first));
-    team.run(part.size(), kSearchedOfBlock, [&](std::size_t begin, std::size_t end) {
+    parallel_for(part.size(), kSearchedOfBlock, threads, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) common[i] = hierarchy.common(whole(part[i]).corners, provable);
     });
     // On one thread and in order, because the lists of pieces and the budgets depend on it.

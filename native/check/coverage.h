@@ -27,8 +27,6 @@
 
 namespace tolvol {
 
-class Team;
-
 class Coverage {
  public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
@@ -62,9 +60,10 @@ class Coverage {
   /// Finds witnesses for triangles of the reference, whose numbers ascend, among the triangles of a mesh. `ids[i]` is
   /// the element that triangle i of the mesh is, or kNone if it never changes. A piece farther than `provable` from all
   /// triangles gets no witness; in a triangle with a point that far, a small part near the mesh may get none either.
+  /// Uses this many threads (0: one for each core), which never change a result.
   /// About 0.5 us a triangle on one thread where one face covers all of it.
   Uncovered find_witnesses(std::span<const std::uint32_t> triangles, const TriangleMesh& mesh,
-                           std::span<const std::uint32_t> ids, double provable, Team& team, Progress* progress);
+                           std::span<const std::uint32_t> ids, double provable, unsigned threads, Progress* progress);
 
   /// A point that stands for a piece. sample() adds one for every `stride`-th piece of the element.
   struct Sample {

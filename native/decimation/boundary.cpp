@@ -87,7 +87,8 @@ BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mes
   }
   std::vector<std::uint32_t> all(reference_.triangles.size());
   std::iota(all.begin(), all.end(), 0u);
-  const Coverage::Uncovered uncovered = backward_->find_witnesses(all, elements, ids, provable, team, nullptr);
+  const Coverage::Uncovered uncovered =
+      backward_->find_witnesses(all, elements, ids, provable, static_cast<unsigned>(team.size()), nullptr);
   for (const std::uint32_t t : uncovered.nearest) {
     uncertified_.push_back(elements.triangles[t].x);
     uncertified_.push_back(elements.triangles[t].y);

@@ -205,7 +205,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   certify_input(certificate, proved);
   // A face that is outside has no witness, and so no angle. It is counted as outside.
   std::erase_if(exceeding_, [&](std::uint32_t t) { return exempt_[cut_.triangle_input[t]]; });
-  options_.two_sided ? cover(provable, team) : pin_boundary();
+  options_.two_sided ? cover(provable) : pin_boundary();
   return &*certified_;
 }
 
@@ -271,7 +271,7 @@ void DecimationInput::certify_input(const Certificate& certificate, std::span<co
 }
 
 /// Finds the first witnesses for every triangle of the reference.
-void DecimationInput::cover(double provable, Team& team) {
+void DecimationInput::cover(double provable) {
   if (own_count_ > 0) {
     for (std::uint32_t i = 0; i < own_count_; ++i) {
       if (!is_of_reference(i)) continue;
@@ -279,7 +279,7 @@ void DecimationInput::cover(double provable, Team& team) {
       // What is set aside never changes and covers itself.
       if (element != CutMesh::kNone) backward_->set_witness(element, i);
     }
-    if (joined_) cover_divided(provable, team);
+    if (joined_) cover_divided(provable);
     return;
   }
   TriangleMesh elements{positions_, cut_.triangles};
@@ -293,7 +293,8 @@ void DecimationInput::cover(double provable, Team& team) {
   std::vector<std::uint32_t> all(volume_->reference().triangles.size());
   std::iota(all.begin(), all.end(), 0u);
   if (options_.progress) options_.progress->begin("comparing");
-  const Coverage::Uncovered found = backward_->find_witnesses(all, elements, ids, provable, team, options_.progress);
+  const Coverage::Uncovered found =
+      backward_->find_witnesses(all, elements, ids, provable, options_.threads, options_.progress);
   if (options_.cell) return hold_near(found.in_part, elements, provable);
   report_.uncovered = FaceCount::of(found.triangles);
   if (report_.uncovered.faces) report_.warnings.push_back(take_uncovered(report_.uncovered, options_.outside));
@@ -316,7 +317,7 @@ void DecimationInput::hold_near(std::span<const Part> pieces, const TriangleMesh
 }
 
 /// Finds the first witnesses for the triangles of the reference that were divided, among the pieces.
-void DecimationInput::cover_divided(double provable, Team& team) {
+void DecimationInput::cover_divided(double provable) {
   TriangleMesh pieces{positions_, {}};
   std::vector<std::uint32_t> ids, divided;
   for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
@@ -327,7 +328,8 @@ void DecimationInput::cover_divided(double provable, Team& team) {
     pieces.triangles.push_back(cut_.triangles[element]);
     ids.push_back(element);
   }
-  const Coverage::Uncovered found = backward_->find_witnesses(divided, pieces, ids, provable, team, nullptr);
+  const Coverage::Uncovered found =
+      backward_->find_witnesses(divided, pieces, ids, provable, options_.threads, nullptr);
   report_.uncovered = FaceCount::of(found.triangles);
   if (report_.uncovered.faces) report_.warnings.push_back(take_uncovered(report_.uncovered, options_.outside));
   for (const std::uint32_t t : found.nearest) {

@@ -113,8 +113,8 @@ class DecimationInput {
   bool added_triangles_are_open() const;
   Bounds* set_bounds(Team& team);
   void certify_input(const Certificate& certificate, std::span<const std::uint8_t> proved);
-  void cover(double provable, Team& team);
-  void cover_divided(double provable, Team& team);
+  void cover(double provable);
+  void cover_divided(double provable);
   std::vector<std::uint8_t> face(double provable, Team& team);
   void pin_boundary();
 

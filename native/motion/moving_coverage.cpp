@@ -76,9 +76,8 @@ void MovingCoverage::find_witnesses(Found& found, Progress* progress) const {
       elements.triangles.emplace_back(corners[a], corners[b], corners[c]);
     }
   }
-  Team team(mesh_->threads());
   const Coverage::Uncovered missing =
-      layer.coverage.find_witnesses(open, elements, ids, mesh_->provable(), team, progress);
+      layer.coverage.find_witnesses(open, elements, ids, mesh_->provable(), mesh_->threads(), progress);
   const FaceCount uncovered = FaceCount::of(missing.triangles);
   found.uncovered.faces = std::max(found.uncovered.faces, uncovered.faces);
   if (uncovered.first)

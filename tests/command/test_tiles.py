@@ -222,6 +222,20 @@ def test_a_folder_with_files_of_another_format_is_refused(tmp_path, monkeypatch)
         Scratch(tmp_path / "scratch", {"IN": "a.ply"}, resume=True)
 
 
+def run(mesh, planned, scratch):
+    """Returns the Result of the rounds of a MappedMesh at a tolerance of 0.02."""
+
+    def each(stage, title, work, jobs):
+        for job in jobs:
+            yield work(job, None)
+
+    folder = Scratch(scratch, {}, resume=False)
+    try:
+        return Rounds(mesh, planned, folder, 0.02, OPTIONS, each).run()
+    finally:
+        folder.close(discard=True)
+
+
 # A cell ---------------------------------------------------------------------------------------------------------------
 
 
@@ -269,14 +283,7 @@ def test_the_results_of_cells_are_one_mesh_within_the_tolerance(tmp_path, kind):
 def test_a_mesh_far_from_the_origin_is_proved(tmp_path, memory):
     vertices, triangles = noisy()
     mesh = MappedMesh(written(tmp_path / "a.ply", vertices + 5e6, triangles, np.float64))
-
-    def each(stage, title, work, jobs):
-        for job in jobs:
-            yield work(job, None)
-
-    folder = Scratch(tmp_path / "scratch", {}, resume=False)
-    found = Rounds(mesh, plan.Plan(mesh, 0.02, memory), folder, 0.02, OPTIONS, each).run()
-    folder.close(discard=True)
+    found = run(mesh, plan.Plan(mesh, 0.02, memory), tmp_path / "scratch")
     assert found.forward.upper <= 0.02 and found.backward.upper <= 0.02 and len(found.triangles) < len(triangles) / 6
 
 
@@ -472,17 +479,24 @@ def test_there_are_at_most_six_rounds_and_more_memory_is_proposed(tmp_path, monk
     mesh = MappedMesh(written(tmp_path / "a.ply", vertices, triangles))
     planned = plan.Plan(mesh, 0.02, plan.FIXED + 2000 * plan.OF_FIRST)
     monkeypatch.setattr("tolvol.tiles.rounds._LEAST_GAIN", -1)  # Each round is worth another.
-
-    def each(stage, title, work, jobs):
-        for job in jobs:
-            yield work(job, None)
-
-    folder = Scratch(tmp_path / "scratch", {}, resume=False)
-    found = Rounds(mesh, planned, folder, 0.02, OPTIONS, each).run()
+    found = run(mesh, planned, tmp_path / "scratch")
     assert len(found.rounds) == 6 and found.rounds[-1][0] > 1
     (note,) = found.warnings
     needed = int(note.partition("--memory ")[2].partition("MB")[0]) * 1_000_000
     left = chunks.write(tmp_path / "left", found.vertices[found.triangles])
     assert len(plan.Plan(mesh, 0.02, needed).later([left], 1).boxes) == 1
     assert f"the last round had {found.rounds[-1][0]} cells" in note
-    folder.close(discard=True)
+
+
+def test_rounds_go_on_in_a_single_cell_while_they_gain(tmp_path, monkeypatch):
+    mesh = MappedMesh(written(tmp_path / "a.ply", *noisy()))
+    planned = plan.Plan(mesh, 0.02, plan.FIXED + mesh.count * 900)
+    found = run(mesh, planned, tmp_path / "scratch")
+    cells = [count for count, _ in found.rounds]
+    assert cells[0] > 1 and cells[1] == 1 and len(cells) < 6
+    monkeypatch.setattr("tolvol.tiles.rounds._LEAST_GAIN", -1)  # Each round is worth another.
+    assert [count for count, _ in run(mesh, planned, tmp_path / "again").rounds] == [cells[0], 1, 1, 1, 1, 1]
+    whole = plan.Plan(mesh, 0.02, 1_000_000_000)
+    assert len(run(mesh, whole, tmp_path / "whole").rounds) == 1, (
+        "what a single cell leaves of the reference is the result"
+    )

@@ -6,7 +6,6 @@
 #include <tuple>
 #include <vector>
 
-#include "base/parallel.h"
 #include "check/coverage.h"
 #include "shapes.h"
 
@@ -24,8 +23,7 @@ TEST(FindWitnesses, TakesFacesAtAHubWhole) {
   std::vector<std::uint32_t> all(reference.triangles.size());
   std::iota(all.begin(), all.end(), 0u);
   Coverage coverage(reference, kLimit, all.size());
-  Team team(1);
-  EXPECT_TRUE(coverage.find_witnesses(all, mesh, all, kLimit, team, nullptr).triangles.empty());
+  EXPECT_TRUE(coverage.find_witnesses(all, mesh, all, kLimit, 1, nullptr).triangles.empty());
   std::size_t pieces = 0;
   for (const std::uint32_t face : all) pieces += coverage.piece_count(face);
   EXPECT_EQ(pieces, all.size()) << "no face is cut";
@@ -41,9 +39,8 @@ TEST(FindWitnesses, ThreadsDoNotChangeABit) {
   std::vector<std::uint32_t> all(reference.triangles.size()), faces(mesh.triangles.size());
   std::iota(all.begin(), all.end(), 0u), std::iota(faces.begin(), faces.end(), 0u);
   const auto found = [&](unsigned threads) {
-    Team team(threads);
     Coverage coverage(reference, kLimit, faces.size());
-    const Coverage::Uncovered uncovered = coverage.find_witnesses(all, mesh, faces, kLimit, team, nullptr);
+    const Coverage::Uncovered uncovered = coverage.find_witnesses(all, mesh, faces, kLimit, threads, nullptr);
     std::vector<std::size_t> pieces;
     for (const std::uint32_t face : faces) pieces.push_back(coverage.piece_count(face));
     return std::tuple(uncovered.triangles, uncovered.nearest, uncovered.in_part.size(), pieces);

@@ -188,7 +188,6 @@ TEST(Hierarchy, LooksAtFewNearTheHubOfUnequalEdges) {
   }
 }
 
-// All triangles around a vertex are at distance 0 from it, and boxes rounded the wrong way would lose some.
 TEST(Hierarchy, AgreesWhereOnlySomeTrianglesAreCutIntoSlices) {
   TriangleMesh mesh = shapes::joined(needles(300, true), soup(21, 500));
   mesh.triangles.push_back({300, 300, 300});  // a point at the hub
@@ -211,6 +210,7 @@ TEST(Hierarchy, AgreesWhereOnlySomeTrianglesAreCutIntoSlices) {
   }
 }
 
+// All triangles around a vertex are at distance 0 from it, and boxes rounded the wrong way would lose some.
 TEST(Hierarchy, AgreesAtSharedVertices) {
   shapes::Random random(19);
   TriangleMesh mesh;

@@ -131,19 +131,8 @@ def test_thorough_holds_the_copies_of_a_vertex_that_is_held():
         ]
     )  # fmt: skip
     triangles = np.array(
-        [
-            (0, 2, 1),
-            (4, 1, 5),
-            (1, 2, 6),
-            (2, 3, 7),
-            (2, 7, 6),
-            (3, 8, 7),
-            (4, 5, 9),
-            (5, 6, 10),
-            (10, 11, 12),
-            (5, 10, 9),
-        ]
-    )
+        [(0, 2, 1), (4, 1, 5), (1, 2, 6), (2, 3, 7), (2, 7, 6), (3, 8, 7), (4, 5, 9), (5, 6, 10), (10, 11, 12), (5, 10, 9)]
+    )  # fmt: skip
     tolerance = 0.04893939530858255
     volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
     locked = np.isin(np.arange(13), [0, 1, 2, 10, 11, 12])

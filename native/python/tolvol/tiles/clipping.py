@@ -12,7 +12,7 @@ from .cells import lowest_and_highest
 # A triangle is shallow against a side if it reaches less than this share of its longest extent across it.
 _SHALLOW = 1 / 16
 # So many times rounding() is the distance by which a triangle that is not shallow may miss points beside the sides of the box.
-_STEEP_LOSS = 64
+STEEP_LOSS = 64
 
 
 def clipped(corners, box):
@@ -36,14 +36,6 @@ def rounding(points):
     Each of six cuts rounds a coordinate by a few units in the last place of the largest coordinate.
     """
     return 128 * float(np.finfo(np.float64).eps) * float(np.abs(points).max(initial=0))
-
-
-def loss(points):
-    """Returns an upper bound, a length, of how far a point of triangles with these corners is from all that cells have of them.
-
-    It holds where those that are shallow against a side of a cell are clipped by the larger box.
-    """
-    return _STEEP_LOSS * rounding(points)
 
 
 def are_shallow(corners, box, margin):

@@ -35,8 +35,8 @@ class Plan:
         self._tolerance, self._memory = tolerance, memory
         corners = _samples(mesh)
         self._points = centroids(corners)
-        self._of_first = OF_FIRST_IF_SHORT if tolerance < _SHORT * _median_edge(corners) else OF_FIRST
-        self._reference = _Load.of(corners, mesh.count, self._of_first)
+        of_each = OF_FIRST_IF_SHORT if tolerance < _SHORT * _median_edge(corners) else OF_FIRST
+        self._reference = _Load.of(corners, mesh.count, of_each)
         cells, needed = self._fewest([self._reference], 0)
         if not cells:
             raise Refused(
@@ -74,7 +74,7 @@ class Plan:
         """Returns (few Cells, each of which fits, or None; the least bytes that were found to be needed)."""
         room = max(0, self._memory - FIXED)
         # Where not even FIXED is there, no cells will do, and the need of small ones is told.
-        wanted, finest = (room, _FINEST) if room else (_SMALL * self._of_first, 1)
+        wanted, finest = (room, _FINEST) if room else (_SMALL * self._reference.of_each, 1)
         points = self._points
         places = points[:: max(1, len(points) // _PLACES)]
         # No cell that holds one of these places needs less.

@@ -72,9 +72,10 @@ class Rounds:
     def run(self):
         """Returns the Result. Raises NotWritten where the scratch folder is full, after which the run can go on."""
         reference = present = self._reference()
-        corners = np.array([corner for chunk in reference for corner in (chunk.bounds.lower, chunk.bounds.upper)])
+        box = reduce(Box.joined, (chunk.bounds for chunk in reference))
         # Far from the origin the measuring of clipped triangles adds more than the headroom of a decimation.
-        shorter = max(self._tolerance - 4 * clipping.loss(corners), self._tolerance / 2)
+        loss = clipping.STEEP_LOSS * clipping.rounding((box.lower, box.upper))
+        shorter = max(self._tolerance - 4 * loss, self._tolerance / 2)
         made, angles, warnings, boxes = [], [0.0], {}, None
         for number in range(_MOST_ROUNDS):
             wanted = self._boxes(number, present, made)

@@ -87,7 +87,7 @@ def measure(tile, progress=None):
 
 def _largest(those, others, tile, threads, progress):
     vertices, triangles = chunks.gather(those, tile.cell)
-    rounding, loss = clipping.rounding(vertices), clipping.loss(vertices)
+    rounding = clipping.rounding(vertices)
     box = tile.cell.grown(rounding)
     # Clipping would give the triangles inside back as they are.
     inside = chunks.of_corners(vertices, triangles, tile.cell.strictly_holds_triangles)
@@ -103,7 +103,8 @@ def _largest(those, others, tile, threads, progress):
     around = chunks.gather(others, box.grown(tile.tolerance))
     if not len(around[1]):
         return tile.tolerance, np.inf
-    # The search ends below the bound, and what is added must not exceed the tolerance.
+    # The search ends below the bound, and with what is added the distance must not exceed the tolerance.
+    loss = clipping.STEEP_LOSS * rounding
     bound = max(tile.tolerance - 2 * loss, 0.0)
     found = package.module.directed_hausdorff(
         vertices, triangles, *around, bound=bound, threads=threads, progress=progress
