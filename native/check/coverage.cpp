@@ -93,7 +93,7 @@ Coverage::Uncovered Coverage::find_witnesses(std::span<const std::uint32_t> tria
                                              std::span<const std::uint32_t> ids, double provable, unsigned threads,
                                              Progress* progress) {
   if (mesh.triangles.empty()) return {{triangles.begin(), triangles.end()}, {}, {}};
-  const Hierarchy hierarchy(mesh);
+  const Hierarchy hierarchy(mesh, threads);
   Uncovered uncovered;
   std::vector<Hierarchy::Common> common(std::min(triangles.size(), kSearchedAtOnce));
   for (std::size_t first = 0; first < triangles.size(); first += kSearchedAtOnce) {

@@ -75,7 +75,7 @@ ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span
     if (part == 0) {
       fill_grid(options);
     } else {
-      hierarchy_.emplace(reference_);
+      hierarchy_.emplace(reference_, options.threads);
     }
   });
 }

@@ -13,7 +13,9 @@
 #include <vector>
 
 #include "base/call.h"
+#include "base/default_init.h"
 #include "geometry/closest_point.h"
+#include "geometry/hub_slices.h"
 #include "geometry/oriented_boxes.h"
 #include "geometry/triangle_mesh.h"
 
@@ -48,8 +50,9 @@ class Hierarchy {
 
   /// Copies the triangles of a valid mesh (geometry/triangle_mesh.h), with about 150 bytes for each, or 330 if nearly
   /// all are needles, and up to six times as much for those around a corner that very many share. O(m), 30 ms for
-  /// 270,000 triangles; O(m log m) for needles. Degenerate triangles are kept as the segments or points that they are.
-  explicit Hierarchy(const TriangleMesh& mesh);
+  /// 270,000 triangles on one thread; O(m log m) for needles. Degenerate triangles are kept as the segments or points
+  /// that they are. `threads`: 0 means one for each core.
+  explicit Hierarchy(const TriangleMesh& mesh, unsigned threads = 1);
 
   /// Returns the nearest point of the mesh within `radius` (inclusive). Ties go to the lower triangle index, so that
   /// the result does not depend on the shape of the tree. `hint` is a triangle that is tried first, to shorten the
@@ -106,23 +109,6 @@ class Hierarchy {
     float lower[3][kWidth], upper[3][kWidth];  // are local and rounded outwards; an empty child lies infinitely far
     std::uint32_t child[kWidth];
   };
-  using Corners = std::array<glm::dvec3, 3>;
-
-  /// A part of a triangle between two lines, each of which is as far from one corner, the hub, on both edges there.
-  /// `from` and `to` are these distances over the longer one of the two edges. By default it is the whole triangle.
-  struct Slice {
-    float from = 0, to = std::numeric_limits<float>::infinity();
-    std::uint32_t hub = 0;
-  };
-
-  /// The lengths of the two edges at the hub of a triangle: to the next corner, and to the one after it.
-  struct Legs {
-    double b, c;
-    Legs(const Corners& t, std::uint32_t hub)
-        : b(glm::distance(t[(hub + 1) % 3], t[hub])), c(glm::distance(t[(hub + 2) % 3], t[hub])) {}
-    double longer() const { return std::max(b, c); }
-  };
-
   struct Build;
   glm::dvec3 scaled(const glm::dvec3& p) const { return p * scale_; }
   /// Returns the local point from which the triangle nearest to p (in the mesh's units) is searched.
@@ -158,15 +144,15 @@ class Hierarchy {
   template <int Count>
   Common common_of(std::span<const glm::dvec3> points, double radius, double enough, std::uint32_t hint) const;
 
-  std::vector<Node> nodes_;              // nodes_[0] is the root
+  Unfilled<Node> nodes_;                 // nodes_[0] is the root
   std::vector<std::uint32_t> turned_;    // maps a node to its oriented boxes or kNone; it is empty if no node has any
   std::vector<OrientedBoxes> oriented_;  // replace the boxes of some nodes
-  std::vector<Corners> corners_;         // are scaled, in the sorted order, with only the first of equal triangles
+  Unfilled<Corners> corners_;            // are scaled, in the sorted order, with only the first of equal triangles
   std::vector<Slice> slices_;            // of all triangles that are cut into slices
-  std::vector<std::uint32_t> slice_;     // maps a place in the sorted order to an index in slices_, or to kNone for a
+  Unfilled<std::uint32_t> slice_;        // maps a place in the sorted order to an index in slices_, or to kNone for a
                                          // whole triangle; empty if there are no slices
-  std::vector<std::uint32_t> triangle_;  // maps a place in the sorted order to an index in the mesh
-  std::vector<std::uint32_t> place_;     // maps an index in the mesh to a place in the sorted order, of any slice
+  Unfilled<std::uint32_t> triangle_;     // maps a place in the sorted order to an index in the mesh
+  Unfilled<std::uint32_t> place_;        // maps an index in the mesh to a place in the sorted order, of any slice
   std::vector<std::uint32_t> twin_;      // is used by twin(), and empty if no two triangles are equal
   glm::dvec3 centre_{0};                 // is scaled
   double scale_ = 1;                     // is a power of two that makes half the size of the mesh 1/2 to 1

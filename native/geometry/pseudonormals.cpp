@@ -10,6 +10,7 @@
 
 #include "base/call.h"
 #include "base/union_find.h"
+#include "geometry/weld.h"
 
 namespace tolvol {
 namespace {

@@ -53,29 +53,4 @@ double enclosed_volume(const TriangleMesh& mesh) {
   return volume;
 }
 
-std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::dvec3> vertices) {
-  // The table uses open addressing and is at most half full.
-  constexpr std::uint32_t kFree = 0xFFFFFFFFu;
-  std::vector<std::uint32_t> first(std::bit_ceil(2 * vertices.size() + 1), kFree);
-  const int bits = std::countr_zero(first.size());
-  const auto place_of = [&](const glm::dvec3& p) {
-    std::uint64_t h = 0;
-    for (int k = 0; k < 3; ++k) {
-      h ^= h >> 32;
-      h ^= std::bit_cast<std::uint64_t>(p[k] + 0.0);  // -0 + 0 is 0, so that equal numbers hash alike
-      h *= 0x9E3779B97F4A7C15u;
-    }
-    return static_cast<std::size_t>(h >> (64 - bits));  // the highest bits depend on all others
-  };
-  std::vector<std::uint32_t> representative(vertices.size());
-  for (std::uint32_t i = 0; i < vertices.size(); ++i) {
-    poll_at(i);
-    std::size_t place = place_of(vertices[i]);
-    while (first[place] != kFree && vertices[first[place]] != vertices[i]) place = (place + 1) & (first.size() - 1);
-    if (first[place] == kFree) first[place] = i;
-    representative[i] = first[place];
-  }
-  return representative;
-}
-
 }  // namespace tolvol

@@ -82,8 +82,4 @@ std::vector<bool> used_vertices(std::size_t vertex_count, std::span<const glm::u
 /// Returns six times the volume that a closed mesh encloses, negative if its faces run the other way round. O(m).
 double enclosed_volume(const TriangleMesh& mesh);
 
-/// Returns for each vertex the first vertex with exactly the same coordinates, which may be itself. Coordinates are
-/// equal if they are equal numbers, so that -0 is 0. O(n) expected.
-std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::dvec3> vertices);
-
 }  // namespace tolvol

@@ -40,6 +40,7 @@
 #include "base/call.h"
 #include "base/parallel.h"
 #include "geometry/hierarchy.h"
+#include "geometry/weld.h"
 #include "measure/placed_pair.h"
 #include "measure/split.h"
 
@@ -144,8 +145,8 @@ class Search {
   Search(const TriangleMesh& a, const TriangleMesh& b, double bound, const HausdorffOptions& options)
       : a_(a),
         b_(b),
-        hierarchy_(b),
-        place_(weld_equal_positions(a.vertices)),
+        hierarchy_(b, options.threads),
+        place_(weld_equal_positions(a.vertices, options.threads)),
         seen_(a.vertices.size()),
         bound_(bound),
         options_(options),

@@ -41,7 +41,7 @@ TriangleMesh searched(const TriangleMesh& b) {
 
 SampledSurface::SampledSurface(const PlacedPair& pair, const TriangleMesh& world_b, const DeviationOptions& options)
     : b_(searched(pair.b)),
-      hierarchy_(b_),
+      hierarchy_(b_, options.threads),
       sides_(pair, world_b),
       threads_(options.threads),
       progress_(options.progress) {

@@ -13,6 +13,7 @@
 #include "base/parallel.h"
 #include "check/certificate.h"
 #include "check/input_checks.h"
+#include "geometry/weld.h"
 #include "motion/constrain.h"
 #include "motion/moving_coverage.h"
 #include "motion/moving_crossings.h"

@@ -7,6 +7,7 @@
 
 #include "base/call.h"
 #include "base/parallel.h"
+#include "geometry/weld.h"
 #include "motion/moving_mesh.h"
 #include "motion/selection.h"
 #include "topology/orientation.h"

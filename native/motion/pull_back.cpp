@@ -15,6 +15,7 @@
 #include "base/call.h"
 #include "check/input_checks.h"
 #include "geometry/triangle_mesh.h"
+#include "geometry/weld.h"
 #include "motion/moving_coverage.h"
 #include "motion/moving_crossings.h"
 

@@ -19,6 +19,7 @@
 #include "base/parallel.h"
 #include "check/certificate.h"
 #include "check/input_checks.h"
+#include "geometry/weld.h"
 #include "motion/finite.h"
 #include "motion/selection.h"
 #include "topology/t_junctions.h"

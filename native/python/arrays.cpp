@@ -52,22 +52,27 @@ std::uint32_t to_index(std::int64_t value, py::ssize_t row, const std::string& n
 
 }  // namespace
 
-Vertices to_vertices(const py::object& object, const std::string& name) {
+Storage require_vertices(const py::object& object, const std::string& name) {
   const py::array array = to_array(object, name, "(n, 3) float32 or float64");
   const bool single = py::isinstance<py::array_t<float>>(array);
   if (!single && !py::isinstance<py::array_t<double>>(array)) wrong_type(array, name, "float32 or float64");
   if (array.ndim() != 2 || array.shape(1) != 3) wrong_shape(array, name, "(n, 3)");
   if (array.shape(0) >= std::numeric_limits<std::int32_t>::max())
     throw InvalidInput(name + " has more than 2^31 - 1 rows");
+  return single ? Storage::float32 : Storage::float64;
+}
+
+Vertices to_vertices(const py::object& object, const std::string& name) {
   Vertices result;
-  result.storage = single ? Storage::float32 : Storage::float64;
+  result.storage = require_vertices(object, name);
+  const py::array array = to_array(object, name, "(n, 3) float32 or float64");
   result.values.resize(static_cast<std::size_t>(array.shape(0)));
   const auto copy = [&](const auto& view) {
     for (py::ssize_t i = 0; i < view.shape(0); ++i) {
       result.values[static_cast<std::size_t>(i)] = {view(i, 0), view(i, 1), view(i, 2)};
     }
   };
-  if (single) {
+  if (result.storage == Storage::float32) {
     copy(py::array_t<float>(array).unchecked<2>());
   } else {
     copy(py::array_t<double>(array).unchecked<2>());

@@ -28,6 +28,8 @@ struct Vertices {
   Storage storage;
 };
 Vertices to_vertices(const py::object& array, const std::string& name);
+/// Returns what such an array holds.
+Storage require_vertices(const py::object& array, const std::string& name);
 
 /// Takes an (m, 3) array of any integer type. This refuses negative values; the native validation refuses large values.
 std::vector<glm::uvec3> to_triangles(const py::object& array, const std::string& name);

@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "check/input_checks.h"
 #include "geometry/frame.h"
+#include "geometry/weld.h"
 #include "repair/earlier_fillings.h"
 #include "repair/filling.h"
 #include "repair/filling_rules.h"

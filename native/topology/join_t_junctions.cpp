@@ -13,6 +13,7 @@
 
 #include "base/call.h"
 #include "geometry/triangle_mesh.h"
+#include "geometry/weld.h"
 #include "topology/divide_triangle.h"
 #include "topology/face_tree.h"
 #include "topology/faces_cross.h"

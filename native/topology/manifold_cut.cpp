@@ -16,6 +16,7 @@
 
 #include "base/call.h"
 #include "geometry/triangle_mesh.h"
+#include "geometry/weld.h"
 #include "topology/sides.h"
 #include "topology/sort_by.h"
 
@@ -29,7 +30,10 @@ constexpr double kUpon = 0.9;
 class Cutter {
  public:
   Cutter(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, Team& team)
-      : team_(team), positions_(vertices), input_(triangles), weld_(weld_equal_positions(vertices)) {
+      : team_(team),
+        positions_(vertices),
+        input_(triangles),
+        weld_(weld_equal_positions(vertices, unsigned(team.size()))) {
     cut_.stand_in.resize(triangles.size());
     std::iota(cut_.stand_in.begin(), cut_.stand_in.end(), 0u);
     const std::vector<bool> used = used_vertices(vertices.size(), triangles);

@@ -7,6 +7,7 @@
 #include "base/call.h"
 #include "base/union_find.h"
 #include "geometry/triangle_mesh.h"
+#include "geometry/weld.h"
 #include "topology/sides.h"
 
 namespace tolvol {

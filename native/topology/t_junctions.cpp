@@ -12,6 +12,7 @@
 #include "geometry/closest_point.h"
 #include "geometry/hierarchy.h"
 #include "geometry/lengths.h"
+#include "geometry/weld.h"
 #include "topology/face_tree.h"
 #include "topology/near_points.h"
 

@@ -11,7 +11,7 @@ import pytest
 import tolvol
 import trimesh
 from tolvol.command import mesh_files, polygons
-from tolvol.command.mesh import Attribute, Mesh, joined, weld, welded
+from tolvol.command.mesh import Attribute, Mesh, joined, weld
 from tolvol.shared.errors import Refused
 
 import meshes
@@ -121,7 +121,7 @@ def test_welding_is_exact_and_keeps_the_order_of_the_file():
         places = rng.integers(-3, 3, (500, 3)).astype(dtype) / 3
         places[::7] = np.nextafter(places[::7], dtype(9))
         places[::5] *= -1  # which leaves some -0.0
-        kept, number = welded(places)
+        kept, number = tolvol.weld(places)
         assert np.array_equal(kept[number], places)
         assert len(kept) == len({tuple(row) for row in (places + 0).tolist()})
         assert (np.diff([number.tolist().index(i) for i in range(len(kept))]) > 0).all()

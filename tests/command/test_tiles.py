@@ -113,16 +113,13 @@ def test_a_vertex_that_is_not_finite_is_named_by_its_number(tmp_path):
 @pytest.mark.parametrize("count", [1, 2, 5, 16])
 def test_cells_are_all_of_space_and_hold_about_as_many_points(count):
     points = np.random.default_rng(1).normal(size=(4000, 3))
-    sides = []
-    for turn in range(3):
-        cells = Cells(points, count, turn)
+    for boxes, most in ((None, 1.01), ((points, points + 0.1), 1.6)):
+        cells = Cells(points, count, boxes)
         holders = np.array([box.holds(points) for box in cells.boxes])
-        assert len(cells.boxes) == count + (turn % 2 if count > 1 else 0) and (holders.sum(0) == 1).all()
+        assert len(cells.boxes) == count and (holders.sum(0) == 1).all()
         assert np.array_equal(np.argmax(holders, 0), cells.of(points))
-        assert holders.sum(1).max() <= 1.1 * len(points) / count
+        assert holders.sum(1).max() <= most * len(points) / count + 1
         assert (np.array([box.holds(1e6 * points) for box in cells.boxes]).sum(0) == 1).all()
-        sides.append({x for box in cells.boxes for x in (*box.lower, *box.upper) if np.isfinite(x)})
-    assert not sides[0] & sides[1] and not sides[1] & sides[2]
 
 
 def test_points_on_each_other_are_not_divided():
@@ -244,7 +241,8 @@ def rounds(tmp_path, reference, tolerance, counts, **options):
     whole = (chunks.write(tmp_path / "reference", reference),)
     present = whole
     for turn, count in enumerate(counts):
-        boxes = Cells(reference.mean(1), count, turn).boxes
+        mesh = corners_of(present)
+        boxes = Cells(reference.mean(1), count, (mesh.min(1), mesh.max(1))).boxes
         tiles = [Tile(box, present, whole, tolerance, OPTIONS | options) for box in boxes]
         present = tuple(decimate(tile, tmp_path / f"{turn}_{i}")[0] for i, tile in enumerate(tiles))
     return corners_of(present), present, whole
@@ -271,8 +269,8 @@ def test_the_results_of_cells_are_one_mesh_within_the_tolerance(tmp_path, kind):
         facts = tolvol.solidity(*ours)
         assert facts["closed"] and facts["manifold"] and facts["oriented"]
     # The cells' measurements tell the same.
-    for turn in (0, 5):
-        boxes = Cells(corners.mean(1), 5, turn).boxes
+    for count in (5, 7):
+        boxes = Cells(corners.mean(1), count).boxes
         ends = np.array([measure(Tile(box, present, whole, tolerance, OPTIONS)) for box in boxes])
         for way, exact in enumerate((both.forward, both.backward)):
             lower, upper = ends[:, way].max(0)
@@ -358,17 +356,17 @@ def test_the_cells_fit_the_memory_and_the_last_round_is_whole_if_it_can_be(tmp_p
 
     def cells(memory, left):
         planned = plan.Plan(mesh, 0.01, plan.FIXED + memory)
-        return len(planned.first.boxes), *(len(planned.later([left], turn).boxes) for turn in (1, 2))
+        return len(planned.first.boxes), len(planned.later([left]).boxes)
 
     assert cells(mesh.count * plan.OF_FIRST_IF_SHORT, everything)[0] == 1
-    assert cells(mesh.count * (plan.OF_REFERENCE + plan.OF_MESH), everything) == (1, 1, 1)
+    assert cells(mesh.count * (plan.OF_REFERENCE + plan.OF_MESH), everything) == (1, 1)
     of_little = mesh.count * plan.OF_REFERENCE + little.count * plan.OF_MESH
-    assert cells(of_little, little) == (4, 1, 1)
+    assert cells(of_little, little) == (4, 1)
     # Where nothing has gone, later rounds need as many cells as the first.
     assert min(cells(of_little, everything)) >= 3
-    first, *rest = cells(1000 * plan.OF_FIRST_IF_SHORT, little)
+    first, later = cells(1000 * plan.OF_FIRST_IF_SHORT, little)
     assert mesh.count / 1000 <= first < 2 * mesh.count / 1000
-    assert max(rest) < 0.6 * first
+    assert later < 0.6 * first
 
 
 def test_there_are_no_cells_for_a_later_round_that_cannot_fit_the_memory(tmp_path):
@@ -376,7 +374,7 @@ def test_there_are_no_cells_for_a_later_round_that_cannot_fit_the_memory(tmp_pat
     mesh = MappedMesh(written(tmp_path / "a.ply", vertices, triangles))
     crowded = chunks.write(tmp_path / "crowded", np.concatenate([vertices[triangles][:1]] * 2000))
     planned = plan.Plan(mesh, 0.01, plan.FIXED + 1000 * plan.OF_FIRST_IF_SHORT)
-    assert planned.later([crowded], 1) is None
+    assert planned.later([crowded]) is None
     assert planned.needed([crowded]) == plan.FIXED + mesh.count * plan.OF_REFERENCE + 2000 * plan.OF_MESH
 
 
@@ -397,25 +395,30 @@ def test_too_little_memory_is_refused_with_what_is_needed(tmp_path):
         plan.Plan(mesh, 1.0, plan.FIXED + 100 * plan.OF_FIRST)
 
 
+def are_beside_a_side(points, cells, length):
+    beside = [box.grown(length).holds(points) & ~box.grown(-length).holds(points) for box in cells.boxes]
+    return np.any(beside, 0)
+
+
+@pytest.mark.parametrize("size", [(1, 1, 1), (10, 1, 1)])
 @pytest.mark.parametrize("count", [2, 3, 4, 7])
-def test_the_sides_of_the_cells_of_two_turns_lie_apart_in_a_long_mesh(count):
-    points = np.random.default_rng(1).uniform(size=(20_000, 3)) * [10, 1, 1]
-
-    def cuts(turn):
-        found = Cells(points, count, turn)
-        assert np.bincount(found.of(points)).max() <= 20_000 / count + 1
-        return np.array([box.lower[0] for box in found.boxes if np.isfinite(box.lower[0])])
-
-    for turn in range(5):
-        one, other = cuts(turn), cuts(turn + 1)
-        assert abs(one[:, None] - other).min() > 10 / count / 20
+def test_the_sides_of_cells_keep_away_from_the_faces_beside_those_before(count, size):
+    points = np.random.default_rng(1).uniform(size=(20_000, 3)) * size
+    cells = Cells(points, count)
+    for _ in range(5):
+        # A round leaves small faces beside the sides of its cells, and few others.
+        beside = are_beside_a_side(points, cells, max(size) / count / 20)
+        small, others = points[beside], points[~beside][::50]
+        boxes = np.concatenate([small - 0.001, others - 0.02]), np.concatenate([small + 0.001, others + 0.02])
+        cells = Cells(points, count, boxes)
+        assert np.count_nonzero(are_beside_a_side(small, cells, 0.001)) < len(small) / 50
 
 
 def test_cells_know_how_many_boxes_are_near_them():
     random = np.random.default_rng(1)
     lowest = random.normal(size=(3000, 3))
     highest = lowest + random.exponential(0.1, size=(3000, 3))
-    cells = Cells(lowest, 12, 1)
+    cells = Cells(lowest, 12)
     expected = [box.grown(0.2).meets_boxes(lowest, highest).sum() for box in cells.boxes]
     assert cells.count_near(lowest, highest, 0.2).tolist() == expected and min(expected) > 3000 / 12
 
@@ -435,7 +438,7 @@ def test_triangles_that_reach_into_many_cells_need_memory_in_each(tmp_path):
 
 def test_hopelessly_little_memory_for_many_triangles_is_refused_after_few_tries(tmp_path, monkeypatch):
     mesh, made = MappedMesh(written(tmp_path / "a.ply", *meshes.plate(n=257))), []
-    monkeypatch.setattr(plan, "Cells", lambda points, count, turn: made.append(count) or Cells(points, count, turn))
+    monkeypatch.setattr(plan, "Cells", lambda points, count, boxes: made.append(count) or Cells(points, count, boxes))
     for tolerance, memory in ((0.001, 1_000_000), (0.5, plan.FIXED + 100 * plan.OF_FIRST)):
         with pytest.raises(Refused, match="--memory"):
             plan.Plan(mesh, tolerance, memory)
@@ -484,7 +487,7 @@ def test_there_are_at_most_six_rounds_and_more_memory_is_proposed(tmp_path, monk
     (note,) = found.warnings
     needed = int(note.partition("--memory ")[2].partition("MB")[0]) * 1_000_000
     left = chunks.write(tmp_path / "left", found.vertices[found.triangles])
-    assert len(plan.Plan(mesh, 0.02, needed).later([left], 1).boxes) == 1
+    assert len(plan.Plan(mesh, 0.02, needed).later([left]).boxes) == 1
     assert f"the last round had {found.rounds[-1][0]} cells" in note
 
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <set>
 
+#include "geometry/weld.h"
 #include "many.h"
 #include "shapes.h"
 #include "topology/sides.h"

@@ -8,6 +8,7 @@
 #include "check/certificate.h"
 #include "decimation/bounded_mesh.h"
 #include "decimation/certified_bounds.h"
+#include "geometry/weld.h"
 #include "shapes.h"
 #include "topology/manifold_cut.h"
 

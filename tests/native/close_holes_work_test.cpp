@@ -8,6 +8,7 @@
 
 #include "base/errors.h"
 #include "base/progress.h"
+#include "geometry/weld.h"
 #include "holes.h"
 #include "many.h"
 #include "polls.h"

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "geometry/weld.h"
 #include "many.h"
 #include "shapes.h"
 #include "wishes.h"

@@ -93,6 +93,28 @@ TriangleMesh needles(unsigned count, bool around_a_point) {
   return mesh;
 }
 
+// Searches visit the same nodes, so that the trees are the same; the last mesh has slices and oriented boxes.
+TEST(Hierarchy, ThreadsMakeTheSameTree) {
+  TriangleMesh mesh = soup(3, many(60'000));
+  const TriangleMesh equal = soup(4, 2000);
+  mesh = shapes::joined(shapes::joined(mesh, equal), shapes::joined(equal, needles(many(20'000), true)));
+  const Hierarchy alone(mesh);
+  for (const unsigned threads : {2u, 5u}) {
+    const Hierarchy shared(mesh, threads);
+    ASSERT_EQ(shared.node_count(), alone.node_count());
+    EXPECT_EQ(shared.has_mostly_needles(), alone.has_mostly_needles());
+    shapes::Random random(5);
+    for (int i = 0; i < 2000; ++i) {
+      const dvec3 p = 1.5 * random.point();
+      const Hierarchy::Nearest one = alone.nearest(p), other = shared.nearest(p);
+      ASSERT_EQ(one.triangle, other.triangle);
+      ASSERT_EQ(one.nodes, other.nodes);
+      const auto hint = std::uint32_t(random.below(unsigned(mesh.triangles.size())));
+      ASSERT_EQ(alone.nearest(p, kInfinity, hint).nodes, shared.nearest(p, kInfinity, hint).nodes);
+    }
+  }
+}
+
 TEST(Hierarchy, AgreesWithBruteForceAmongNeedles) {
   for (const bool around_a_point : {true, false}) {
     const TriangleMesh mesh = needles(700, around_a_point);

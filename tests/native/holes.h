@@ -12,6 +12,7 @@
 #include <set>
 #include <vector>
 
+#include "geometry/weld.h"
 #include "measure/hausdorff.h"
 #include "repair/close_holes.h"
 #include "shapes.h"

@@ -9,6 +9,7 @@
 
 #include "decimation_cases.h"
 #include "geometry/frame.h"
+#include "geometry/weld.h"
 #include "shapes.h"
 #include "topology/crossings.h"
 #include "topology/divide_triangle.h"

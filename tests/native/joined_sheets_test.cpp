@@ -13,6 +13,7 @@
 
 #include "base/union_find.h"
 #include "decimation_cases.h"
+#include "geometry/weld.h"
 #include "many.h"
 
 namespace {

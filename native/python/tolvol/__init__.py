@@ -65,6 +65,7 @@ from ._native import (
     solidity,
     transfer_colours,
     wedges,
+    weld,
 )
 
 __all__ = [
@@ -112,6 +113,7 @@ __all__ = [
     "solidity",
     "transfer_colours",
     "wedges",
+    "weld",
 ]
 
 

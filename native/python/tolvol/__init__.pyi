@@ -365,6 +365,7 @@ class HausdorffResult:
     @property
     def backward(self) -> DirectedHausdorffResult: ...
 
+def weld(vertices: _Vertices, *, threads: int | None = None) -> tuple[NDArray[np.floating[Any]], NDArray[np.int32]]: ...
 def crossing_pairs(
     vertices: _Vertices,
     triangles: _Integers,

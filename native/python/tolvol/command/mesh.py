@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..welding import welded
+from ..shared import package
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Mesh:
 
 def weld(mesh):
     """Returns the mesh with one vertex at each position. Its attributes may then differ from corner to corner."""
-    vertices, number = welded(mesh.vertices)
+    vertices, number = package.module.weld(mesh.vertices)
     if len(vertices) == len(mesh.vertices):
         return mesh
     attributes = {name: replace(kept, split=True) for name, kept in mesh.attributes.items()}

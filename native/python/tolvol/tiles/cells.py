@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_SHARES = (0.5, 0.3, 0.7, 0.4, 0.6)  # of the cells below a cut, turn by turn
+_SHIFTS = (0, 1 / 8, -1 / 8, 1 / 4, -1 / 4)  # of a cut from where all cells would hold as many points, in cells
 
 
 @dataclass(frozen=True)
@@ -72,38 +72,39 @@ EVERYWHERE = Box((-math.inf,) * 3, (math.inf,) * 3)
 class Cells:
     """About `count` cells that hold about as many of some points, (k, 3), each; fewer where many points lie on each other.
 
-    Each cut is across a long axis of the points. `turn` chooses the axis, and how many of the cells are below the cut. In every
-    second turn there is a cell more than `count`, and the first cut is half a cell away from where it would be. So most sides
-    of the cells of one turn lie apart from those of the next. O(k log count).
+    Each cut is across a long axis of the points. `boxes`, the lowest and the highest corners of j boxes, (j, 3) each: a cut is
+    where it meets few of them, for which a part may hold more points than its share, by up to a quarter of a cell.
+    O((k + j) log count).
     """
 
-    def __init__(self, points, count, turn=0):
+    def __init__(self, points, count, boxes=None):
         self.boxes = []
-        self._root = self._cut(points.astype(np.float64), count, turn, EVERYWHERE, turn % 2)
+        self._root = self._cut(points.astype(np.float64), count, EVERYWHERE, boxes)
 
-    def _cut(self, points, count, turn, box, is_shifted=False):
+    def _cut(self, points, count, space, boxes):
         """Returns (axis, at, the node below, the node above), or the number of a cell."""
-        if count > 1 and len(points) > 1:
-            axis = _axis(points.max(0) - points.min(0), turn)
-            count, half = (count + 1, 0.5) if is_shifted else (count, 0)
-            below = min(max(round(_SHARES[turn % len(_SHARES)] * count), 1), count - 1)
-            values = points[:, axis]
-            # Points at the cut are above it. Where the lowest point is there, the cut goes to the next coordinate.
-            above = values[values > values.min()]
-            if len(above):
-                rank = int(len(values) * (below - half) / (count - 2 * half))
-                at = float(max(np.partition(values, rank)[rank], above.min()))
-                is_below = points[:, axis] < at
-                lower = Box(box.lower, _with(box.upper, axis, at))
-                upper = Box(_with(box.lower, axis, at), box.upper)
-                return (
-                    axis,
-                    at,
-                    self._cut(points[is_below], below, turn + 1, lower),
-                    self._cut(points[~is_below], count - below, turn + 1, upper),
-                )
-        self.boxes.append(box)
-        return len(self.boxes) - 1
+        places = list(_places(points, count, boxes)) if count > 1 and len(points) > 1 else []
+        if not places:
+            self.boxes.append(space)
+            return len(self.boxes) - 1
+        boxes_below = boxes_above = None
+        if boxes is None:
+            axis, at, below = places[0]
+        else:
+            lowest, highest = boxes
+            axis, at, below = min(places, key=lambda place: _met(*boxes, *place[:2]))
+            boxes_below, boxes_above = (
+                (lowest[rows], highest[rows]) for rows in (lowest[:, axis] <= at, highest[:, axis] >= at)
+            )
+        is_below = points[:, axis] < at
+        lower = Box(space.lower, _with(space.upper, axis, at))
+        upper = Box(_with(space.lower, axis, at), space.upper)
+        return (
+            axis,
+            at,
+            self._cut(points[is_below], below, lower, boxes_below),
+            self._cut(points[~is_below], count - below, upper, boxes_above),
+        )
 
     def of(self, points):
         """Returns the number of the cell that holds each point, (k,)."""
@@ -140,10 +141,30 @@ class Cells:
         return counts
 
 
-def _axis(extent, turn):
-    """Returns one of the axes along which the extent is at least half of the longest, turn by turn."""
-    order = np.argsort(-extent, kind="stable")
-    return int(order[turn % np.count_nonzero(extent >= extent.max() / 2)])
+def _places(points, count, boxes):
+    """Yields where some points may be cut: (axis, at, the number of cells below), the best first for cells of one size.
+
+    An axis is long if the extent along it is at least half of the longest. Without boxes there is one place.
+    """
+    extent = points.max(0) - points.min(0)
+    for axis in np.argsort(-extent, kind="stable"):
+        values = points[:, axis]
+        # Points at the cut are above it. Where the lowest point is there, the cut goes to the next coordinate.
+        above = values[values > values.min()]
+        if not len(above) or extent[axis] < extent.max() / 2:
+            return
+        belows = sorted(range(math.ceil(count / 3), 2 * count // 3 + 1), key=lambda below: abs(2 * below - count))
+        ranks = [(below, int(len(values) * (below + shift) / count)) for below in belows for shift in _SHIFTS]
+        ordered = np.partition(values, [rank for _, rank in ranks])
+        for below, rank in ranks:
+            yield int(axis), float(max(ordered[rank], above.min())), below
+            if boxes is None:
+                return
+
+
+def _met(lowest, highest, axis, at):
+    """Returns how many boxes a cut meets."""
+    return np.count_nonzero((lowest[:, axis] <= at) & (highest[:, axis] >= at))
 
 
 def _with(corner, axis, value):

@@ -5,13 +5,14 @@ import errno
 import os
 import uuid
 import zlib
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
+from ..shared import package
 from ..shared.errors import NotWritten, Refused
-from ..welding import welded
 from .cells import Box
 
 _AT_ONCE = 1 << 16  # triangles whose corners are looked at together
@@ -122,9 +123,9 @@ def failed(error, path):
     return NotWritten(f"{path}: {error.strerror}")
 
 
-def mesh_of(corners):
+def mesh_of(corners, threads=1):
     """Returns (vertices, triangles) of triangles, (k, 3, 3), with one vertex at each position."""
-    vertices, number = welded(corners.reshape(-1, 3))
+    vertices, number = package.module.weld(corners.reshape(-1, 3), threads=threads)
     return vertices, number.reshape(-1, 3)
 
 
@@ -135,23 +136,22 @@ def bounds_of(points):
     return Box(tuple(points.min(0).tolist()), tuple(points.max(0).tolist()))
 
 
-def gather(chunks, box):
+def gather(chunks, box, threads=None):
     """Returns (vertices, triangles): the triangles of some chunks, in their order, whose own bounding box meets a box.
 
     Each position has one vertex, and each vertex is used.
     """
-    parts = []
-    for chunk in chunks:
-        if chunk.count and chunk.bounds.meets(box):
-            vertices, triangles = chunk.mesh()
-            if not box.contains(chunk.bounds):
-                vertices, triangles = selected(
-                    vertices, triangles, of_corners(vertices, triangles, box.meets_triangles)
-                )
-            parts.append((vertices, triangles))
-    vertices, triangles = joined(parts)
-    del parts  # The memory is needed.
-    vertices, number = welded(vertices)
+
+    def part(chunk):
+        vertices, triangles = chunk.mesh()
+        if box.contains(chunk.bounds):
+            return vertices, triangles
+        return selected(vertices, triangles, of_corners(vertices, triangles, box.meets_triangles))
+
+    near = [chunk for chunk in chunks if chunk.count and chunk.bounds.meets(box)]
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        vertices, triangles = joined(list(pool.map(part, near)))
+    vertices, number = package.module.weld(vertices, threads=threads)
     return vertices, number[triangles]
 
 

@@ -12,7 +12,7 @@ from .cells import Box, Cells, centroids, lowest_and_highest
 # What the work in a cell takes at its peak, in bytes (docs/benchmark.md). FIXED: by itself. OF_FIRST: for each triangle in the
 # first round, where the mesh is the reference. OF_FIRST_IF_SHORT: in place of OF_FIRST where the tolerance is short, because
 # more triangles of the reference are cut into pieces then. OF_REFERENCE, OF_MESH: for each triangle of these in later rounds.
-FIXED, OF_FIRST, OF_FIRST_IF_SHORT, OF_REFERENCE, OF_MESH = 160 << 20, 1120, 2000, 515, 2450
+FIXED, OF_FIRST, OF_FIRST_IF_SHORT, OF_REFERENCE, OF_MESH = 160 << 20, 1000, 2000, 430, 2450
 _SHORT = 1 / 4  # A tolerance below this share of the median edge is short.
 # This share of the memory beside FIXED may be the grid of distances.
 OF_GRID = 1 / 4
@@ -37,7 +37,7 @@ class Plan:
         self._points = centroids(corners)
         of_each = OF_FIRST_IF_SHORT if tolerance < _SHORT * _median_edge(corners) else OF_FIRST
         self._reference = _Load.of(corners, mesh.count, of_each)
-        cells, needed = self._fewest([self._reference], 0)
+        cells, needed = self._fewest([self._reference])
         if not cells:
             raise Refused(
                 f"--memory: {memory // 1_000_000:,} MB is too little: the triangles within the tolerance of one place need at "
@@ -45,18 +45,19 @@ class Plan:
             )
         self.first = cells
 
-    def later(self, chunks, turn):
-        """Returns the Cells of round `turn`, 1 for the second one, for the mesh that these chunks hold.
+    def later(self, chunks):
+        """Returns the Cells of a later round for the mesh that these chunks hold.
 
-        There is a single cell where all of the mesh and the reference fits the memory; None if no cells fit it.
+        Their sides meet few of its faces, and so keep away from the sides of earlier cells, beside which most faces are. There is
+        a single cell where all of the mesh and the reference fits the memory; None if no cells fit it.
         """
         count = sum(chunk.count for chunk in chunks)
         step = math.ceil(max(1, count) / _SAMPLES)
         corners = np.concatenate(
             [vertices[triangles[::step]] for vertices, triangles in (chunk.mesh() for chunk in chunks)]
         )
-        loads = [replace(self._reference, of_each=OF_REFERENCE), _Load.of(corners, count, OF_MESH)]
-        return self._fewest(loads, turn)[0]
+        mesh = _Load.of(corners, count, OF_MESH)
+        return self._fewest([replace(self._reference, of_each=OF_REFERENCE), mesh], (mesh.lowest, mesh.highest))[0]
 
     def needed(self, chunks):
         """Returns the bytes with which the round after the one that has left these chunks would have a single cell."""
@@ -70,8 +71,11 @@ class Plan:
         """Returns the most bytes that the grid of a cell's volume may take."""
         return max(0, int((self._memory - FIXED) * OF_GRID))
 
-    def _fewest(self, loads, turn):
-        """Returns (few Cells, each of which fits, or None; the least bytes that were found to be needed)."""
+    def _fewest(self, loads, boxes=None):
+        """Returns (few Cells, each of which fits, or None; the least bytes that were found to be needed).
+
+        boxes: as Cells takes them.
+        """
         room = max(0, self._memory - FIXED)
         # Where not even FIXED is there, no cells will do, and the need of small ones is told.
         wanted, finest = (room, _FINEST) if room else (_SMALL * self._reference.of_each, 1)
@@ -84,7 +88,7 @@ class Plan:
         count = min(math.ceil(sum(load.bytes for load in loads) / wanted), len(points))
         limit, least = min(finest * count, len(points)), math.inf
         while True:
-            cells = Cells(points, count, turn)
+            cells = Cells(points, count, boxes)
             needed = sum(load.near(cells, self._tolerance) for load in loads).max()
             least = min(least, needed)
             if needed <= wanted:

@@ -142,7 +142,7 @@ class Rounds:
         elif number == 1 and made[0][0] == 1:
             return None
         else:
-            cells = self._plan.later(present, number)
+            cells = self._plan.later(present)
             is_vain = len(made) > 1 and made[-1][1] > (1 - _LEAST_GAIN) * made[-2][1]
             # The first round with a single cell is never in vain.
             if not cells or (is_vain and (len(cells.boxes) > 1 or made[-1][0] == 1)):

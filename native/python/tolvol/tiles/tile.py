@@ -35,7 +35,7 @@ def decimate(tile, output, progress=None):
     (Chunk, the largest angle in degrees between a new face and its witnesses, or None if there is a face without an angle, and a
     list of warnings).
     """
-    vertices, triangles = chunks.gather(tile.mesh, tile.cell)
+    vertices, triangles = chunks.gather(tile.mesh, tile.cell, tile.options["threads"])
     inside = chunks.of_corners(vertices, triangles, tile.cell.strictly_holds_triangles)
     rest = vertices[triangles[~inside]]
     owned = rest[tile.cell.holds(centroids(rest))]
@@ -48,12 +48,11 @@ def decimate(tile, output, progress=None):
 
 def _decimated(tile, vertices, triangles, inside, progress):
     """Returns (the corners of what the triangles inside become, the angle, warnings), or None where the volume is too small."""
-    native = package.module
+    native, threads = package.module, tile.options["threads"]
     if tile.reference == tile.mesh:
         around = vertices, triangles
     else:
-        around = chunks.gather(tile.reference, tile.cell.grown(tile.tolerance))
-    threads = tile.options["threads"]
+        around = chunks.gather(tile.reference, tile.cell.grown(tile.tolerance), threads)
     try:
         volume = native.ToleranceVolume(
             *around, tile.tolerance, grid_memory=tile.grid_memory, threads=threads, progress=progress
@@ -86,7 +85,7 @@ def measure(tile, progress=None):
 
 
 def _largest(those, others, tile, threads, progress):
-    vertices, triangles = chunks.gather(those, tile.cell)
+    vertices, triangles = chunks.gather(those, tile.cell, threads)
     rounding = clipping.rounding(vertices)
     box = tile.cell.grown(rounding)
     # Clipping would give the triangles inside back as they are.
@@ -100,7 +99,7 @@ def _largest(those, others, tile, threads, progress):
     vertices, triangles = chunks.joined([(vertices, triangles), chunks.mesh_of(clipped)])
     if not len(triangles):
         return 0.0, 0.0
-    around = chunks.gather(others, box.grown(tile.tolerance))
+    around = chunks.gather(others, box.grown(tile.tolerance), threads)
     if not len(around[1]):
         return tile.tolerance, np.inf
     # The search ends below the bound, and with what is added the distance must not exceed the tolerance.

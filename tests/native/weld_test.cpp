@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "geometry/weld.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <map>
+#include <random>
+#include <tuple>
+
+#include "many.h"
+
+namespace {
+
+using namespace tolvol;
+
+template <class Vector>
+std::vector<std::uint32_t> weld(const std::vector<Vector>& vertices, unsigned threads = 1) {
+  return weld_equal_positions(std::span<const Vector>(vertices), threads);
+}
+
+/// Few coordinates, so that many are equal and many share their place in a table.
+template <class Vector>
+std::vector<Vector> crowded(unsigned values, std::size_t count) {
+  using Real = typename Vector::value_type;
+  std::mt19937 engine(values);
+  std::vector<Vector> vertices;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double sign = engine() % 2 ? 1 : -1;  // -0 too
+    vertices.emplace_back(Real(sign * (engine() % values)), Real(engine() % values * 0x1p-40), Real(engine() % values));
+  }
+  return vertices;
+}
+
+template <class Vector>
+void expect_the_first_of_equal_ones() {
+  EXPECT_TRUE(weld(std::vector<Vector>()).empty());
+  EXPECT_EQ(weld(std::vector{Vector(1)}), std::vector<std::uint32_t>{0});
+  for (const unsigned values : {1u, 2u, 5u, 40u}) {
+    const std::vector<Vector> vertices = crowded<Vector>(values, 9000);
+    std::map<std::tuple<double, double, double>, std::uint32_t> first;
+    const std::vector<std::uint32_t> welded = weld(vertices);
+    for (std::uint32_t i = 0; i < vertices.size(); ++i) {
+      const Vector& p = vertices[i];
+      ASSERT_EQ(welded[i], first.try_emplace({p.x, p.y, p.z}, i).first->second) << "vertex " << i;
+    }
+  }
+}
+
+TEST(Weld, EqualPositionsAreWeldedToTheFirst) {
+  expect_the_first_of_equal_ones<glm::dvec3>();
+  expect_the_first_of_equal_ones<glm::vec3>();
+}
+
+TEST(Weld, WhatIsNoNumberStaysApart) {
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(weld(std::vector<glm::dvec3>(3, glm::dvec3(0, none, 0))), (std::vector<std::uint32_t>{0, 1, 2}));
+}
+
+TEST(Weld, ThreadsFindTheSame) {
+  const std::vector<glm::vec3> vertices = crowded<glm::vec3>(90, many(300'000));
+  const std::vector<std::uint32_t> alone = weld(vertices);
+  for (const unsigned threads : {2u, 3u, 8u}) EXPECT_EQ(weld(vertices, threads), alone);
+}
+
+}  // namespace
