@@ -10,11 +10,6 @@
 #include "geometry/pseudonormals.h"
 
 namespace tolvol {
-namespace {
-
-constexpr double kCoarser = 0.8;  // multiplies the precision until the grid fits
-
-}  // namespace
 
 DisplayGrid::DisplayGrid(const TriangleMesh& reference, bool mirrored, double tolerance, const Options& options) {
   const Call call(options.progress);

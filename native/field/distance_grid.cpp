@@ -38,7 +38,8 @@ Layout layout(const Box& box, double tolerance, double precision) {
 double precision_that_fits(const Box& box, double tolerance, double finest, std::size_t most) {
   double precision = finest;
   // This ends because a coarser grid has fewer nodes, down to the few of a band around a box smaller than a cell.
-  while (layout(box, tolerance, precision).bytes() > static_cast<double>(std::max(most, kLeastBudget))) precision /= 2;
+  while (layout(box, tolerance, precision).bytes() > static_cast<double>(std::max(most, kLeastBudget)))
+    precision *= kCoarser;
   return precision;
 }
 
@@ -48,7 +49,7 @@ DistanceGrid layout_grid(const Box& box, double tolerance, std::optional<double>
   }
   const Layout l =
       layout(box, tolerance, precision.value_or(precision_that_fits(box, tolerance, kFinestPrecision, most)));
-  if (l.bytes() > kGridBudget) {
+  if (precision && l.bytes() > kGridBudget) {
     std::ostringstream text;
     text << "a precision of " << *precision << " needs a grid of " << l.bytes() / (1 << 20) << " MB, the limit is "
          << (kGridBudget >> 20) << " MB; precision " << precision_that_fits(box, tolerance, *precision) << " fits";

@@ -11,8 +11,14 @@
 
 namespace tolvol {
 
-/// The most bytes for distances and ids together. It is a constant, so that results do not depend on the machine.
+/// The most bytes for distances and ids together, unless someone asks for another number. It is a constant, so that
+/// results do not depend on the machine.
 inline constexpr std::size_t kGridBudget = std::size_t{256} << 20;
+
+/// A grid that does not fit is made coarser by this factor. With 1/2, up to seven eighths of the memory would stay
+/// unused, and at half the precision the decimation of a mesh whose edges are far shorter than the tolerance takes half
+/// as long again.
+inline constexpr double kCoarser = 0.8;
 
 struct DistanceGrid {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
@@ -46,12 +52,12 @@ struct DistanceGrid {
   }
 };
 
-/// Returns the finest of `finest`, `finest` / 2, `finest` / 4, ... whose grid takes at most `most` bytes, or
-/// 4,096 if that is more.
+/// Returns the finest of `finest`, 0.8 `finest`, 0.64 `finest`, ... whose grid takes at most `most` bytes, or 4,096 if
+/// that is more.
 double precision_that_fits(const Box& box, double tolerance, double finest, std::size_t most = kGridBudget);
 
 /// Lays out the grid of a reference: its box enlarged by the band, with the spacing tolerance / precision. If
-/// `precision` is empty it is the finest of 1, 1/2, 1/4, ... that fits `most` bytes. Allocates nothing. Throws
+/// `precision` is empty it is the finest of 1, 0.8, 0.64, ... that fits `most` bytes. Allocates nothing. Throws
 /// ResourceLimit, naming a precision that fits, for a precision whose grid takes more than kGridBudget.
 DistanceGrid layout_grid(const Box& box, double tolerance, std::optional<double> precision,
                          std::size_t most = kGridBudget);

@@ -129,8 +129,11 @@ TEST(Layout, PrecisionLadderFitsTheBudget) {
     const DistanceGrid grid = layout_grid(box, tolerance, std::nullopt);
     const double precision = tolerance / grid.spacing;
     EXPECT_LE(precision, last);
-    EXPECT_DOUBLE_EQ(std::exp2(std::round(std::log2(precision))), precision) << "1, 1/2, 1/4, ...";
-    EXPECT_LE(std::size_t(grid.pitch) * grid.nodes.y * grid.nodes.z * 8, kGridBudget);
+    const double step = std::round(std::log(precision) / std::log(0.8));
+    EXPECT_NEAR(std::pow(0.8, step), precision, 1e-12 * precision) << "1, 0.8, 0.64, ...";
+    const std::size_t memory = std::size_t(grid.pitch) * grid.nodes.y * grid.nodes.z * 8;
+    EXPECT_LE(memory, kGridBudget);
+    EXPECT_TRUE(precision == 1 || memory > kGridBudget / 3) << "the next step takes less than twice as much";
     last = precision;
   }
   EXPECT_DOUBLE_EQ(0.1 / layout_grid(box, 0.1, 3.0).spacing, 3.0);
