@@ -10,7 +10,8 @@
 
 namespace tolvol {
 
-/// An allocator that default-initialises: numbers, and classes without a constructor, keep what was in the memory.
+/// An allocator that default-initialises: numbers, and classes whose default constructor sets nothing, keep what was in
+/// the memory.
 template <class T>
 struct DefaultInit : std::allocator<T> {
   template <class U>

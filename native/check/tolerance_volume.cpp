@@ -6,7 +6,6 @@
 
 #include "base/call.h"
 #include "base/errors.h"
-#include "base/parallel.h"
 #include "field/fast_marching.h"
 #include "field/scatter.h"
 #ifdef TOLVOL_GL
@@ -70,14 +69,8 @@ ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span
   const glm::dvec3 reach = glm::max(-box.lower, box.upper);
   if (!(std::max({reach.x, reach.y, reach.z}) <= kAboutOne)) refuse_tolerance();
   grid_ = layout_grid(box, frame_tolerance(), options.precision, options.grid_memory);
-  // The two parts run at the same time, because neither needs the other.
-  parallel_for(2, 1, options.threads, [&](std::size_t part, std::size_t) {
-    if (part == 0) {
-      fill_grid(options);
-    } else {
-      hierarchy_.emplace(reference_, options.threads);
-    }
-  });
+  fill_grid(options);
+  hierarchy_.emplace(reference_, options.threads);
 }
 
 void ToleranceVolume::fill_grid(const Options& options) {

@@ -15,6 +15,8 @@ namespace tolvol {
 /// results do not depend on the machine.
 inline constexpr std::size_t kGridBudget = std::size_t{256} << 20;
 
+/// A grid has fewer than 2^31 nodes, because node numbers of 32 bits have to do (field/fast_marching.cpp).
+inline constexpr std::size_t kLargestGrid = std::size_t{16} << 30;
 /// A grid that does not fit is made coarser by this factor. With 1/2, up to seven eighths of the memory would stay
 /// unused, and at half the precision the decimation of a mesh whose edges are far shorter than the tolerance takes half
 /// as long again.

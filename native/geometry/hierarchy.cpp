@@ -22,6 +22,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/hub_slices.h"
 #include "geometry/lengths.h"
 
 namespace tolvol {
@@ -44,7 +45,7 @@ template void Hierarchy::box_distances(const Node&, const double (&)[3], const d
 
 bool Hierarchy::is_nearest_slice(const glm::dvec3& q, std::uint32_t place) const {
   if (slice_[place] == kNone) return true;
-  const Slice& slice = slices_[slice_[place]];
+  const HubSlice& slice = slices_[slice_[place]];
   const Corners& t = corners_[place];
   const Legs legs(t, slice.hub);
   const glm::dvec3 weights = closest_point(q, t[0], t[1], t[2]).weights;

@@ -15,11 +15,18 @@
 #include "base/call.h"
 #include "base/default_init.h"
 #include "geometry/closest_point.h"
-#include "geometry/hub_slices.h"
 #include "geometry/oriented_boxes.h"
 #include "geometry/triangle_mesh.h"
 
 namespace tolvol {
+
+/// A part of a triangle (geometry/hub_slices.h) between two lines, each of which is as far from one corner, the hub, on
+/// both edges there. `from` and `to` are these distances over the longer one of the two edges. By default it is the
+/// whole triangle.
+struct HubSlice {
+  float from = 0, to = std::numeric_limits<float>::infinity();
+  std::uint32_t hub = 0;
+};
 
 /// A hierarchy is immutable once it is built, so that any number of threads may search it at the same time. Its results
 /// are the same on every machine.
@@ -148,7 +155,7 @@ class Hierarchy {
   std::vector<std::uint32_t> turned_;    // maps a node to its oriented boxes or kNone; it is empty if no node has any
   std::vector<OrientedBoxes> oriented_;  // replace the boxes of some nodes
   Unfilled<Corners> corners_;            // are scaled, in the sorted order, with only the first of equal triangles
-  std::vector<Slice> slices_;            // of all triangles that are cut into slices
+  std::vector<HubSlice> slices_;         // of all triangles that are cut into slices
   Unfilled<std::uint32_t> slice_;        // maps a place in the sorted order to an index in slices_, or to kNone for a
                                          // whole triangle; empty if there are no slices
   Unfilled<std::uint32_t> triangle_;     // maps a place in the sorted order to an index in the mesh

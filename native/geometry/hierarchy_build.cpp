@@ -24,10 +24,11 @@
 namespace tolvol {
 namespace {
 
-/// A range of more triangles is divided among the threads. A thread takes this many elements of a loop at once.
+/// A range of more triangles is divided among the threads.
 constexpr std::uint32_t kOfSubtree = 4096;
+/// A thread takes this many elements of a loop at once.
 constexpr std::size_t kBlock = 4096;
-/// With fewer triangles a thread would cost more time than it saves.
+/// A thread gets at least about this many triangles: for fewer, starting it would take longer.
 constexpr std::size_t kOfThread = 20'000;
 
 struct FloatBox {
@@ -58,11 +59,12 @@ struct Hierarchy::Build {
     int count = 1;
     std::array<Range, kWidth> range{whole};
   };
-  /// A range whose node, and the nodes below it, one thread makes: tree.nodes_ from `next` on. If the range is large,
-  /// only its node, and other subtrees are below it, one after another from `below` on.
+  /// A range of the sorted order. One thread makes its node and the nodes below it: `nodes` of them from
+  /// tree.nodes_[first] on. If the range is large, it makes the node alone, and the parts of the range are the subtrees
+  /// from `below` on.
   struct Subtree {
     Range range;
-    std::uint32_t nodes = 1, next = 0;
+    std::uint32_t nodes = 1, first = 0;
     std::size_t below = 0;
     FloatBox box{};
     std::vector<std::pair<std::uint32_t, OrientedBoxes>> oriented{};  // of nodes, in no order
@@ -239,7 +241,7 @@ struct Hierarchy::Build {
     return parts;
   }
 
-  /// Fills a node, of whose children child_of(i, box) returns the number and sets the box, and returns its box.
+  /// Fills a node and returns its box. child_of(range, box) sets the box of a child and returns its number.
   template <class ChildOf>
   FloatBox fill(std::uint32_t index, const Parts& parts, Subtree& subtree, ChildOf&& child_of) const {
     Node& node = tree.nodes_[index];
@@ -270,12 +272,13 @@ struct Hierarchy::Build {
     return nodes;
   }
 
-  /// Makes the node of a range and the nodes below it, and returns its box.
-  FloatBox make(Range range, Subtree& subtree) const {
-    const std::uint32_t index = subtree.next++;
+  /// Makes the node of a range and the nodes below it, from tree.nodes_[next] on, and returns its box.
+  FloatBox make(Range range, std::uint32_t& next, Subtree& subtree) const {
+    const std::uint32_t index = next++;
+    poll_at(index);
     return fill(index, parts_of(range), subtree, [&](Range part, FloatBox& box) {
-      const std::uint32_t child = subtree.next;
-      box = make(part, subtree);
+      const std::uint32_t child = next;
+      box = make(part, next, subtree);
       return child;
     });
   }
@@ -298,26 +301,38 @@ struct Hierarchy::Build {
     };
     for_each_small([&](Subtree& subtree) { subtree.nodes = count_nodes(subtree.range); });
     std::uint32_t count = 0;
-    for (Subtree& subtree : subtrees) subtree.next = std::exchange(count, count + subtree.nodes);
+    for (Subtree& subtree : subtrees) subtree.first = std::exchange(count, count + subtree.nodes);
     tree.nodes_.resize(count);
-    std::vector<std::uint32_t> first;
-    for (const Subtree& subtree : subtrees) first.push_back(subtree.next);
-    for_each_small([&](Subtree& subtree) { subtree.box = make(subtree.range, subtree); });
+    for_each_small([&](Subtree& subtree) {
+      std::uint32_t next = subtree.first;
+      subtree.box = make(subtree.range, next, subtree);
+    });
     for (std::size_t i = subtrees.size(); i-- > 0;) {
-      if (!subtrees[i].is_large()) continue;
-      const Parts parts = parts_of(subtrees[i].range);
-      subtrees[i].box =
-          fill(first[i], parts, subtrees[i], [&, below = subtrees[i].below](Range, FloatBox& box) mutable {
-            box = subtrees[below].box;
-            return first[below++];
+      Subtree& large = subtrees[i];
+      if (!large.is_large()) continue;
+      large.box =
+          fill(large.first, parts_of(large.range), large, [&, next = large.below](Range, FloatBox& box) mutable {
+            const Subtree& child = subtrees[next++];
+            box = child.box;
+            return child.first;
           });
     }
-    for (const Subtree& subtree : subtrees) {
+    gather_oriented(subtrees);
+  }
+
+  void gather_oriented(std::vector<Subtree>& subtrees) {
+    std::size_t count = 0;
+    for (const Subtree& subtree : subtrees) count += subtree.oriented.size();
+    if (count == 0) return;
+    tolvol::fill(tree.turned_, tree.nodes_.size(), kNone);
+    tree.oriented_.reserve(count);
+    for (Subtree& subtree : subtrees) {
+      poll();
       for (const auto& [node, boxes] : subtree.oriented) {
-        if (tree.turned_.empty()) tree.turned_.assign(count, kNone);
         tree.turned_[node] = std::uint32_t(tree.oriented_.size());
         tree.oriented_.push_back(boxes);
       }
+      subtree.oriented = {};  // Among needles they would take as much memory again.
     }
   }
 };

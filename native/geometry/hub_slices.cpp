@@ -18,21 +18,23 @@ constexpr double kOverlap = 1e-9;
 /// meets it is not sharp else.
 constexpr double kSharp = 1.0 / 16;
 
-/// How a triangle is cut: at its hub, or 3 if it has none, into so many slices.
+/// `hub` is the corner around which a triangle is cut, or 3 for none, and `slices` the number of its parts.
 struct Cuts {
   std::uint8_t hub = 3, slices = 1;
 };
 
 /// Returns the Cuts of the triangle of each key, or nothing if there is no hub.
 std::vector<Cuts> find_hubs(const TriangleMesh& mesh, const Unfilled<MortonKey>& keys) {
-  // The triangles at a place are counted by a hash, those at a vertex before. Another place with the same hash may make
-  // a hub of one that is none, which costs a little time.
-  std::vector<std::uint32_t> at_vertex(mesh.vertices.size());
+  // Triangles are counted at each vertex, then at each place, which a hash of the position finds. Two places with one
+  // hash may make a hub of a corner that is none, which costs a little time.
+  std::vector<std::uint32_t> at_vertex;
+  fill(at_vertex, mesh.vertices.size(), 0u);
   for (std::size_t i = 0; i < keys.size(); ++i) {
     poll_at(i);
     for (int k = 0; k < 3; ++k) ++at_vertex[mesh.triangles[keys[i].triangle][k]];
   }
-  std::vector<std::uint32_t> count(std::bit_ceil(2 * mesh.vertices.size()));
+  std::vector<std::uint32_t> count;
+  fill(count, std::bit_ceil(2 * mesh.vertices.size()), 0u);
   const auto slot_of = [&](std::uint32_t vertex) {
     std::uint64_t hash = 0;
     const glm::dvec3 p = mesh.vertices[vertex] + 0.0;  // makes 0 of -0
@@ -67,10 +69,10 @@ std::vector<Cuts> find_hubs(const TriangleMesh& mesh, const Unfilled<MortonKey>&
 
 }  // namespace
 
-Outline outline(const Corners& scaled, const Slice& slice, const glm::dvec3& centre) {
-  const Corners t{scaled[0] - centre, scaled[1] - centre, scaled[2] - centre};
+Outline outline(const Corners& corners, const HubSlice& slice, const glm::dvec3& centre) {
+  const Corners t{corners[0] - centre, corners[1] - centre, corners[2] - centre};
   if (slice.from == 0 && slice.to > 1) return {t[0], t[1], t[2], t[2], t[2]};
-  const Legs legs(scaled, slice.hub);
+  const Legs legs(corners, slice.hub);
   const glm::dvec3 &hub = t[slice.hub], &b = t[(slice.hub + 1) % 3], &c = t[(slice.hub + 2) % 3];
   const glm::dvec3 &near = legs.b < legs.c ? b : c, &far = legs.b < legs.c ? c : b;
   const double middle = std::min(legs.b, legs.c) / legs.longer();
@@ -103,7 +105,7 @@ HubSlices cut_at_hubs(const TriangleMesh& mesh, double scale, const glm::dvec3& 
     }
     float to = std::numeric_limits<float>::infinity(), from = 1 / kTaper;
     for (std::uint8_t k = 0; k < slices; ++k, to = from, from /= kTaper) {
-      const Slice slice{k + 1 == slices ? 0 : from, to, hub};
+      const HubSlice slice{k + 1 == slices ? 0 : from, to, hub};
       found.outlines.push_back(outline(corners, slice, centre));
       Box box;
       for (const glm::dvec3& corner : found.outlines.back()) box.add(corner);

@@ -12,23 +12,15 @@
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
-#include <limits>
 #include <vector>
 
 #include "base/default_init.h"
-#include "geometry/triangle_mesh.h"
+#include "geometry/hierarchy.h"
 
 namespace tolvol {
 
 class Team;
 struct MortonKey;
-
-/// A part of a triangle between two lines, each of which is as far from one corner, the hub, on both edges there.
-/// `from` and `to` are these distances over the longer one of the two edges. By default it is the whole triangle.
-struct Slice {
-  float from = 0, to = std::numeric_limits<float>::infinity();
-  std::uint32_t hub = 0;
-};
 
 /// The lengths of the two edges at the hub of a triangle: to the next corner, and to the one after it.
 struct Legs {
@@ -42,20 +34,22 @@ struct Legs {
 /// fewer than five, some are the same.
 using Outline = std::array<glm::dvec3, 5>;
 
-/// The slice is within this length of its outline, in local coordinates: these err by less than 7e-14, because a share
-/// of an edge errs by less than 9 u / kSharp (hub_slices.cpp), u = 2^-53, and an edge is at most 3.5 long.
+/// Boxes of slices are wider by this, in local coordinates, because the computed corners of an outline err by less than
+/// 7e-14: a share of an edge errs by less than 9 u / kSharp (hub_slices.cpp), u = 2^-53, and an edge is at most 3.5
+/// long.
 inline constexpr double kSliceRoom = 1e-13;
 
-Outline outline(const Corners& scaled, const Slice& slice, const glm::dvec3& centre);
+/// Returns the outline of a slice of a triangle, whose corners and whose hierarchy's centre are scaled.
+Outline outline(const Corners& corners, const HubSlice& slice, const glm::dvec3& centre);
 
 struct HubSlices {
-  std::vector<Slice> slices;
+  std::vector<HubSlice> slices;
   std::vector<Outline> outlines;
 };
 
-/// Returns the slices of the triangles around hubs. `keys` are those of triangles of the mesh, sorted by code; they
-/// become those of whole triangles and of slices, whose `slice` is an index. `scale` and `centre` are the hierarchy's.
-/// O(n).
+/// Returns the slices of the triangles around hubs. `keys` are those of triangles of the mesh, sorted by code. The key
+/// of each triangle that is cut is replaced by one for each of its slices, and the keys are sorted again. `scale` and
+/// `centre` are the hierarchy's. O(n).
 HubSlices cut_at_hubs(const TriangleMesh& mesh, double scale, const glm::dvec3& centre, Unfilled<MortonKey>& keys,
                       Team& team);
 

@@ -10,7 +10,7 @@
 
 namespace tolvol {
 
-/// A triangle, or a slice of one, to be sorted. hierarchy_build.cpp says what a slice is.
+/// A triangle, or a slice of one (geometry/hub_slices.h), to be sorted.
 struct MortonKey {
   std::uint64_t code;
   std::uint32_t triangle, slice;

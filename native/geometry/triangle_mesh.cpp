@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "geometry/triangle_mesh.h"
 
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <sstream>

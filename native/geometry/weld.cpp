@@ -8,33 +8,36 @@
 #include <type_traits>
 #include <utility>
 
+#include "base/call.h"
 #include "base/default_init.h"
-#include "base/parallel.h"
 
 namespace tolvol {
 namespace {
 
-constexpr std::size_t kOfGroup = 4096;      // A group has about this many vertices.
-constexpr std::size_t kOfThread = 100'000;  // With fewer vertices a thread would cost more time than it saves.
+constexpr std::size_t kOfGroup = 4096;     // A group has about this many vertices.
+constexpr std::size_t kOfThread = 50'000;  // With fewer vertices a thread would cost more time than it saves.
 
 struct Item {
   std::uint32_t hash, vertex;
 };
 
-/// All bits depend on all coordinates, the highest ones most.
 template <class Real>
-std::uint64_t hash_of(const glm::vec<3, Real>& p) {
+std::uint32_t hash_of(const glm::vec<3, Real>& p) {
   using Bits = std::conditional_t<sizeof(Real) == 4, std::uint32_t, std::uint64_t>;
   std::uint64_t h = 0;
-  for (int k = 0; k < 3; ++k) {
-    h ^= h >> 32;
-    h ^= std::bit_cast<Bits>(p[k] + Real(0));  // -0 + 0 is 0, so that equal numbers hash alike
+  // A product's bit depends on the bits below it alone. The shifts bring the others down.
+  const auto mix = [&](std::uint64_t bits) {
+    h ^= bits;
     h *= 0x9E3779B97F4A7C15u;
-  }
-  return h;
+    h ^= h >> 32;
+  };
+  for (int k = 0; k < 3; ++k) mix(std::bit_cast<Bits>(p[k] + Real(0)));  // -0 + 0 is 0: equal numbers hash alike
+  mix(0);
+  return static_cast<std::uint32_t>(h >> 32);
 }
 
-/// Sets the representatives of the vertices of a group.
+/// Sets the representatives of the vertices of a group. The hashes of its items differ in their lowest bits, because
+/// the highest ones have chosen the group.
 template <class Real>
 void weld_group(std::span<const Item> items, std::span<const glm::vec<3, Real>> vertices,
                 std::vector<std::uint32_t>& representative) {
@@ -55,35 +58,39 @@ void weld_group(std::span<const Item> items, std::span<const glm::vec<3, Real>> 
 }
 
 template <class Real>
-std::vector<std::uint32_t> weld(std::span<const glm::vec<3, Real>> vertices, unsigned threads) {
+std::vector<std::uint32_t> weld(std::span<const glm::vec<3, Real>> vertices, Team& team) {
   const std::size_t count = vertices.size();
-  Team team(static_cast<unsigned>(std::min<std::size_t>(thread_count(threads), 1 + count / kOfThread)));
   const std::size_t groups = std::bit_ceil(1 + count / kOfGroup);
   const int bits = std::countr_zero(groups);
-  const auto group_of = [&](std::uint64_t hash) { return bits == 0 ? 0 : hash >> (64 - bits); };
+  const auto group_of = [&](std::uint32_t hash) { return std::uint64_t(hash) << bits >> 32; };
   // Each part of the vertices has its own places in each group, so that no two threads write to one place.
-  const std::size_t parts = team.size();
+  const std::size_t parts = std::min(team.size(), 1 + count / kOfThread);
   std::vector<std::vector<std::uint32_t>> next(parts, std::vector<std::uint32_t>(groups));
-  const auto for_each_hash = [&](auto&& use) {
+  Unfilled<std::uint32_t> hashes(count);
+  const auto for_each_vertex = [&](auto&& use) {
     team.run(parts, 1, [&](std::size_t part, std::size_t) {
       for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
         poll_at(i);
-        const std::uint64_t hash = hash_of(vertices[i]);
-        use(next[part][group_of(hash)], Item{std::uint32_t(hash >> 16), std::uint32_t(i)});
+        use(i, next[part]);
       }
     });
   };
-  for_each_hash([](std::uint32_t& counted, const Item&) { ++counted; });
+  for_each_vertex([&](std::size_t i, std::vector<std::uint32_t>& counts) {
+    hashes[i] = hash_of(vertices[i]);
+    ++counts[group_of(hashes[i])];
+  });
   std::uint32_t before = 0;
-  std::vector<std::uint32_t> begin(groups + 1);
+  std::vector<std::uint32_t> begin(1, 0);
   for (std::size_t group = 0; group < groups; ++group) {
-    begin[group] = before;
     for (auto& of_part : next) before += std::exchange(of_part[group], before);
+    begin.push_back(before);
   }
-  begin[groups] = before;
   Unfilled<Item> items(count);
-  for_each_hash([&](std::uint32_t& place, const Item& item) { items[place++] = item; });
-  std::vector<std::uint32_t> representative(count);
+  for_each_vertex([&](std::size_t i, std::vector<std::uint32_t>& places) {
+    items[places[group_of(hashes[i])]++] = {hashes[i], std::uint32_t(i)};
+  });
+  std::vector<std::uint32_t> representative;
+  fill(representative, count, 0u);
   team.run(groups, 1, [&](std::size_t group, std::size_t) {
     weld_group<Real>({items.data() + begin[group], items.data() + begin[group + 1]}, vertices, representative);
   });
@@ -92,12 +99,17 @@ std::vector<std::uint32_t> weld(std::span<const glm::vec<3, Real>> vertices, uns
 
 }  // namespace
 
-std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::dvec3> vertices, unsigned threads) {
-  return weld(vertices, threads);
+std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::dvec3> vertices, Team& team) {
+  return weld(vertices, team);
 }
 
-std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::vec3> vertices, unsigned threads) {
-  return weld(vertices, threads);
+std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::vec3> vertices, Team& team) {
+  return weld(vertices, team);
+}
+
+std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::dvec3> vertices) {
+  Team alone(1);
+  return weld(vertices, alone);
 }
 
 }  // namespace tolvol

@@ -140,13 +140,18 @@ dvec3 without(const dvec3& v, const dvec3& direction) {
   return length2 > 0 ? v - glm::dot(v, direction) / length2 * direction : v;
 }
 
+std::vector<std::uint32_t> welded(std::span<const dvec3> vertices, unsigned threads) {
+  Team team(thread_count(threads));
+  return weld_equal_positions(vertices, team);
+}
+
 class Search {
  public:
   Search(const TriangleMesh& a, const TriangleMesh& b, double bound, const HausdorffOptions& options)
       : a_(a),
         b_(b),
         hierarchy_(b, options.threads),
-        place_(weld_equal_positions(a.vertices, options.threads)),
+        place_(welded(a.vertices, options.threads)),
         seen_(a.vertices.size()),
         bound_(bound),
         options_(options),

@@ -66,7 +66,7 @@ void MovingMesh::start_facing(FacingRule rule, std::span<const std::uint32_t> pl
   if (is_reference) {
     facing_->reverse_reference(sides.reversed, volume_->hierarchy());
   } else {
-    const std::vector<std::uint32_t> same = weld_equal_positions(reference.vertices);
+    const std::vector<std::uint32_t> same = weld_equal_positions(reference.vertices, team);
     std::vector<glm::uvec3> places;
     places.reserve(reference.triangles.size());
     for (const glm::uvec3& t : reference.triangles) places.emplace_back(same[t.x], same[t.y], same[t.z]);

@@ -28,7 +28,7 @@ struct Vertices {
   Storage storage;
 };
 Vertices to_vertices(const py::object& array, const std::string& name);
-/// Returns what such an array holds.
+/// Throws like to_vertices(), copies nothing, and returns the number type.
 Storage require_vertices(const py::object& array, const std::string& name);
 
 /// Takes an (m, 3) array of any integer type. This refuses negative values; the native validation refuses large values.

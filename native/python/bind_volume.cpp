@@ -43,7 +43,7 @@ std::unique_ptr<Volume> make_volume(const py::object& vertices, const py::object
   if (grid_memory && *grid_memory < 0) throw InvalidInput("grid_memory must not be negative");
   ToleranceVolume::Options options{.precision = precision, .threads = to_threads(threads), .progress = progress};
   options.field = to_field(field);
-  if (grid_memory) options.grid_memory = static_cast<std::size_t>(*grid_memory);
+  if (grid_memory) options.grid_memory = std::min(kLargestGrid, static_cast<std::size_t>(*grid_memory));
   const Interruptible call(progress);
   const auto start = std::chrono::steady_clock::now();
   auto volume =
@@ -164,10 +164,11 @@ triangles : (m, 3) integer array
 tolerance : float
     A positive length in world units, at most the diagonal of the reference.
 precision : float, optional
-    Grid nodes per tolerance. None takes the finest of 1, 0.8, 0.64, ... whose grid fits grid_memory.
+    Grid nodes per tolerance, so many that the grid takes at most 256 MiB. None takes the finest of 1, 0.8, 0.64, ... whose
+    grid fits grid_memory.
 grid_memory : int, optional
-    The most bytes that the grid takes if no precision is given. None is 256 MiB. Less makes proofs slower, and no verdict
-    wrong.
+    The most bytes that the grid takes if no precision is given. None is 256 MiB, and 16 GiB are the most. Less makes
+    proofs slower, and no verdict wrong.
 field : {"scatter", "gl", "fast_marching"}
     What fills the grid: exact distances, computed by the processor or, up to the rounding of float32, by a compute
     shader, or the method of the paper, which is signed, for comparison. With "gl" the number of triangles that a

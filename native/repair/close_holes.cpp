@@ -52,7 +52,7 @@ class Closing {
       : mesh_{triangles, vertices}, space_(space.in(volume.frame())), volume_(volume), options_(options), team_(team) {}
 
   HoleClosingResult run() {
-    std::vector<std::uint32_t> place = weld_equal_positions(mesh_.vertices);
+    std::vector<std::uint32_t> place = weld_equal_positions(mesh_.vertices, team_);
     if (options_.progress) options_.progress->begin("finding holes");
     const std::vector<glm::dvec3> positions = space_.frame(mesh_.vertices);
     for (BoundaryLoop& loop : boundary_loops(positions, place, mesh_.triangles, team_))

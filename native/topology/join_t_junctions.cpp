@@ -40,7 +40,7 @@ class Joining {
         junctions_(junctions.begin(), junctions.end()),
         unit_(unit),
         team_(team),
-        place_(weld_equal_positions(vertices)),
+        place_(weld_equal_positions(vertices, team)),
         vertex_at_(vertices.size(), kNoVertex) {
     for (const glm::uvec3& t : triangles) {
       for (int k = 0; k < 3; ++k) vertex_at_[place_[t[k]]] = std::min(vertex_at_[place_[t[k]]], t[k]);

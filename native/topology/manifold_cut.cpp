@@ -30,10 +30,7 @@ constexpr double kUpon = 0.9;
 class Cutter {
  public:
   Cutter(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, Team& team)
-      : team_(team),
-        positions_(vertices),
-        input_(triangles),
-        weld_(weld_equal_positions(vertices, unsigned(team.size()))) {
+      : team_(team), positions_(vertices), input_(triangles), weld_(weld_equal_positions(vertices, team)) {
     cut_.stand_in.resize(triangles.size());
     std::iota(cut_.stand_in.begin(), cut_.stand_in.end(), 0u);
     const std::vector<bool> used = used_vertices(vertices.size(), triangles);

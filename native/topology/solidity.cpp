@@ -14,7 +14,7 @@ namespace tolvol {
 
 Solidity solidity(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, Team& team) {
   Solidity found;
-  const std::vector<std::uint32_t> position = weld_equal_positions(vertices);
+  const std::vector<std::uint32_t> position = weld_equal_positions(vertices, team);
   std::vector<std::uint32_t> at;       // For each corner of a triangle that counts.
   std::vector<std::uint32_t> counted;  // The triangles that count.
   at.reserve(3 * triangles.size());

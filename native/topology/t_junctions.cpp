@@ -303,7 +303,7 @@ class Finder {
 
   /// Adds open edges that lie across other edges. Faces without a vertex on the edge meet it there.
   void add_across(Team& team, TJunctions& junctions) const {
-    const std::vector<std::uint32_t> first = weld_equal_positions(mesh_.vertices);
+    const std::vector<std::uint32_t> first = weld_equal_positions(mesh_.vertices, team);
     std::vector<std::uint32_t> touching(first.size(),
                                         0);  // by the first vertex at each place: vertices that it touches
     for (std::uint32_t v = 0; v < first.size(); ++v) touching[first[v]] += first[v] != v;

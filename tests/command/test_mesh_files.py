@@ -115,18 +115,6 @@ def test_stl_as_text_is_welded_and_says_so(tmp_path):
     assert tolvol.solidity(found.objects[0].vertices, found.objects[0].triangles)["closed"]
 
 
-def test_welding_is_exact_and_keeps_the_order_of_the_file():
-    rng = np.random.default_rng(3)
-    for dtype in (np.float32, np.float64):
-        places = rng.integers(-3, 3, (500, 3)).astype(dtype) / 3
-        places[::7] = np.nextafter(places[::7], dtype(9))
-        places[::5] *= -1  # which leaves some -0.0
-        kept, number = tolvol.weld(places)
-        assert np.array_equal(kept[number], places)
-        assert len(kept) == len({tuple(row) for row in (places + 0).tolist()})
-        assert (np.diff([number.tolist().index(i) for i in range(len(kept))]) > 0).all()
-
-
 # What formats hold ----------------------------------------------------------------------------------------------------
 
 

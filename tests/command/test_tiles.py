@@ -191,14 +191,16 @@ def test_chunks_are_gathered_by_boxes_with_a_vertex_at_each_position(tmp_path, d
         writer.add(part)
     both = [writer.end(), chunks.write(tmp_path / "rest", corners[2000:])]
     assert [chunk.count for chunk in both] == [2000, len(corners) - 2000]
-    everything = chunks.gather(both, EVERYWHERE)
+    everything = chunks.gather(both, EVERYWHERE, 1)
     assert np.array_equal(everything[0][everything[1]], corners) and everything[0].dtype == dtype
     assert len(everything[0]) == len(vertices)
     box = Box((0.1, 0.2, -9), (0.8, 9, 9))
-    found, number = chunks.gather(both, box)
+    found, number = chunks.gather(both, box, 1)
     expected = corners[(corners.max(1) >= box.lower).all(1) & (corners.min(1) <= box.upper).all(1)]
     assert 100 < len(expected) < len(corners) and np.array_equal(found[number], expected)
     assert len(np.unique(found, axis=0)) == len(found) == len(np.unique(number))
+    for one, other in zip(chunks.gather(both, box, 4), (found, number)):
+        assert np.array_equal(one, other)
 
 
 def test_a_damaged_chunk_is_named(tmp_path):
@@ -208,7 +210,7 @@ def test_a_damaged_chunk_is_named(tmp_path):
     data[1000] ^= 1
     (tmp_path / "c").write_bytes(data)
     with pytest.raises(Refused, match=f"{tmp_path}/c is damaged"):
-        chunks.gather([chunk], EVERYWHERE)
+        chunks.gather([chunk], EVERYWHERE, 1)
 
 
 def test_a_folder_with_files_of_another_format_is_refused(tmp_path, monkeypatch):
@@ -240,11 +242,11 @@ def rounds(tmp_path, reference, tolerance, counts, **options):
     """Returns the corners after rounds over so many cells each, in a folder of the test."""
     whole = (chunks.write(tmp_path / "reference", reference),)
     present = whole
-    for turn, count in enumerate(counts):
+    for number, count in enumerate(counts):
         mesh = corners_of(present)
         boxes = Cells(reference.mean(1), count, (mesh.min(1), mesh.max(1))).boxes
         tiles = [Tile(box, present, whole, tolerance, OPTIONS | options) for box in boxes]
-        present = tuple(decimate(tile, tmp_path / f"{turn}_{i}")[0] for i, tile in enumerate(tiles))
+        present = tuple(decimate(tile, tmp_path / f"{number}_{i}")[0] for i, tile in enumerate(tiles))
     return corners_of(present), present, whole
 
 

@@ -133,9 +133,17 @@ TEST(Layout, PrecisionLadderFitsTheBudget) {
     EXPECT_NEAR(std::pow(0.8, step), precision, 1e-12 * precision) << "1, 0.8, 0.64, ...";
     const std::size_t memory = std::size_t(grid.pitch) * grid.nodes.y * grid.nodes.z * 8;
     EXPECT_LE(memory, kGridBudget);
-    EXPECT_TRUE(precision == 1 || memory > kGridBudget / 3) << "the next step takes less than twice as much";
+    EXPECT_TRUE(precision == 1 || memory > kGridBudget / 3)
+        << "a step takes about half of the memory; padding takes the rest";
     last = precision;
   }
+  // Whoever gives more memory gets a finer grid, and no more than 1 node per tolerance.
+  const auto precision_in = [&](std::size_t memory) {
+    return 0.002 / layout_grid(box, 0.002, std::nullopt, memory).spacing;
+  };
+  EXPECT_LT(precision_in(kGridBudget / 4), precision_in(kGridBudget));
+  EXPECT_LT(precision_in(kGridBudget), precision_in(2 * kGridBudget));
+  EXPECT_DOUBLE_EQ(precision_in(kLargestGrid), 1);
   EXPECT_DOUBLE_EQ(0.1 / layout_grid(box, 0.1, 3.0).spacing, 3.0);
   EXPECT_THROW(layout_grid(box, 0.1, 0.0), InvalidInput);
   EXPECT_THROW(layout_grid(box, 0.1, std::numeric_limits<double>::quiet_NaN()), InvalidInput);

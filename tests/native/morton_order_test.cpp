@@ -31,8 +31,8 @@ TEST(MortonOrder, SortsByCodeAndKeepsTheOrderOfEqualOnes) {
   }
 }
 
-// Halves of the cube, of the halves, and so on, have codes of their own.
-TEST(MortonOrder, ACodeDividesSpaceLastAlongX) {
+// The highest bit tells the halves along z apart, the next one those along y, then x.
+TEST(MortonOrder, TheBitsOfACodeAreHalvesOfSpace) {
   EXPECT_EQ(morton_code(glm::dvec3(-1)), 0u);
   EXPECT_EQ(morton_code(glm::dvec3(-2)), 0u);
   EXPECT_EQ(morton_code(glm::dvec3(1)), (std::uint64_t(1) << 63) - 1);

@@ -212,3 +212,12 @@ def test_a_piece_near_the_limit_where_the_nearest_triangle_changes_within_it(dis
     height = distance * np.sqrt(2)
     piece = np.array([[-0.4, -0.5, height], [0.4, -0.5, height], [0.1, 0.6, height]])
     assert volume.check(piece, np.array([[0, 1, 2]], np.int32)).verdicts[0] == verdict
+
+
+def test_the_memory_of_a_grid_is_as_asked():
+    """The rest of a volume, and what it proves, do not depend on it."""
+    mesh = meshes.torus(60, 30)
+    sizes = [tolvol.ToleranceVolume(*mesh, 0.004, grid_memory=memory).memory for memory in (0, 2**20, 2**28, 2**29)]
+    assert sizes == sorted(sizes) and sizes[1] < sizes[0] + 2**20 and sizes[3] > sizes[0] + 2**28
+    with pytest.raises(tolvol.InvalidInput, match="grid_memory"):
+        tolvol.ToleranceVolume(*mesh, 0.004, grid_memory=-1)

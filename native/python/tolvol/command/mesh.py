@@ -37,7 +37,7 @@ class Mesh:
 
 def weld(mesh):
     """Returns the mesh with one vertex at each position. Its attributes may then differ from corner to corner."""
-    vertices, number = package.module.weld(mesh.vertices)
+    vertices, number = package.module.weld(mesh.vertices, threads=1)
     if len(vertices) == len(mesh.vertices):
         return mesh
     attributes = {name: replace(kept, split=True) for name, kept in mesh.attributes.items()}

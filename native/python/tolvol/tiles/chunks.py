@@ -18,6 +18,7 @@ from .cells import Box
 _AT_ONCE = 1 << 16  # triangles whose corners are looked at together
 _COUNTS = np.dtype("<i8")  # A block begins with the number of its vertices and that of its triangles.
 _INDEX = np.dtype("<i4")
+_READERS = 4  # threads that read: each has a chunk in memory, for which the plan has no room.
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -123,9 +124,9 @@ def failed(error, path):
     return NotWritten(f"{path}: {error.strerror}")
 
 
-def mesh_of(corners, threads=1):
+def mesh_of(corners):
     """Returns (vertices, triangles) of triangles, (k, 3, 3), with one vertex at each position."""
-    vertices, number = package.module.weld(corners.reshape(-1, 3), threads=threads)
+    vertices, number = package.module.weld(corners.reshape(-1, 3), threads=1)
     return vertices, number.reshape(-1, 3)
 
 
@@ -136,7 +137,7 @@ def bounds_of(points):
     return Box(tuple(points.min(0).tolist()), tuple(points.max(0).tolist()))
 
 
-def gather(chunks, box, threads=None):
+def gather(chunks, box, threads):
     """Returns (vertices, triangles): the triangles of some chunks, in their order, whose own bounding box meets a box.
 
     Each position has one vertex, and each vertex is used.
@@ -149,7 +150,7 @@ def gather(chunks, box, threads=None):
         return selected(vertices, triangles, of_corners(vertices, triangles, box.meets_triangles))
 
     near = [chunk for chunk in chunks if chunk.count and chunk.bounds.meets(box)]
-    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+    with ThreadPoolExecutor(min(threads or os.cpu_count(), _READERS)) as pool:
         vertices, triangles = joined(list(pool.map(part, near)))
     vertices, number = package.module.weld(vertices, threads=threads)
     return vertices, number[triangles]

@@ -14,7 +14,7 @@ from .cells import Box, Cells, centroids, lowest_and_highest
 # more triangles of the reference are cut into pieces then. OF_REFERENCE, OF_MESH: for each triangle of these in later rounds.
 FIXED, OF_FIRST, OF_FIRST_IF_SHORT, OF_REFERENCE, OF_MESH = 160 << 20, 1000, 2000, 430, 2450
 _SHORT = 1 / 4  # A tolerance below this share of the median edge is short.
-# This share of the memory beside FIXED may be the grid of distances.
+# This share of the memory beside FIXED may be the grid of distances, which these bytes include.
 OF_GRID = 1 / 4
 
 _SAMPLES = 1 << 19  # triangles that stand for all

@@ -99,7 +99,7 @@ class Rounds:
                 "fewer triangles"
             )
             warnings[text] = None
-        vertices, triangles = chunks.gather(present, EVERYWHERE)
+        vertices, triangles = chunks.gather(present, EVERYWHERE, self._options["threads"])
         like = Tile(None, present, reference, self._tolerance, self._options)
         measured = self._steps("certify", "measuring", "measured", measure, like, boxes)
         forward, backward = (
