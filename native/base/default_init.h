@@ -15,7 +15,7 @@ namespace tolvol {
 template <class T>
 struct DefaultInit : std::allocator<T> {
   template <class U>
-  struct rebind {
+  struct rebind {  // NOLINT(readability-identifier-naming): containers ask for this name
     using other = DefaultInit<U>;
   };
   DefaultInit() = default;

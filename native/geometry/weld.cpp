@@ -46,14 +46,19 @@ void weld_group(std::span<const Item> items, std::span<const glm::vec<3, Real>> 
   std::vector<std::uint32_t> first(std::bit_ceil(2 * items.size() + 1), kFree);
   for (std::uint32_t i = 0; i < items.size(); ++i) {
     poll_at(i);
-    const auto [hash, vertex] = items[i];
-    std::size_t place = hash & (first.size() - 1);
+    const Item& item = items[i];
+    const glm::vec<3, Real>& position = vertices[item.vertex];
+    if (position != position) {  // What is no number equals nothing, and would fill the table.
+      representative[item.vertex] = item.vertex;
+      continue;
+    }
+    std::size_t place = item.hash & (first.size() - 1);
     const auto differs = [&](const Item& other) {
-      return other.hash != hash || vertices[other.vertex] != vertices[vertex];
+      return other.hash != item.hash || vertices[other.vertex] != position;
     };
     while (first[place] != kFree && differs(items[first[place]])) place = (place + 1) & (first.size() - 1);
     if (first[place] == kFree) first[place] = i;
-    representative[vertex] = items[first[place]].vertex;
+    representative[item.vertex] = items[first[place]].vertex;
   }
 }
 

@@ -11,7 +11,7 @@ from tolvol.tiles import chunks, clipping, plan
 from tolvol.tiles.cells import EVERYWHERE, Box, Cells, centroids
 from tolvol.tiles.chunks import mesh_of
 from tolvol.tiles.mapped import MappedMesh
-from tolvol.tiles.rounds import Rounds
+from tolvol.tiles.rounds import Rounds, _expected_gain
 from tolvol.tiles.scratch import Scratch
 from tolvol.tiles.tile import Tile, decimate, measure
 
@@ -491,6 +491,20 @@ def test_there_are_at_most_six_rounds_and_more_memory_is_proposed(tmp_path, monk
     left = chunks.write(tmp_path / "left", found.vertices[found.triangles])
     assert len(plan.Plan(mesh, 0.02, needed).later([left]).boxes) == 1
     assert f"the last round had {found.rounds[-1][0]} cells" in note
+
+
+@pytest.mark.parametrize(
+    "counts, expected",
+    [
+        ([1000, 500, 250], 0.5),
+        ([1000, 100, 90], 0.1 * 0.1 / 0.9),
+        ([1000, 1000, 900], 0.1),
+        ([9, 8, 8], 0),
+        ([5, 0, 0], 0),
+    ],
+)
+def test_the_gain_of_a_round_falls_as_it_fell_before(counts, expected):
+    assert _expected_gain(counts) == pytest.approx(expected)
 
 
 def test_rounds_go_on_in_a_single_cell_while_they_gain(tmp_path, monkeypatch):

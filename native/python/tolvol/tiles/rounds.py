@@ -21,7 +21,7 @@ from .tile import Tile
 
 _MOST_ROUNDS = 6
 _PARTS = 8  # chunks of the reference for each cell of the first round
-# A round that removes a smaller share of the triangles is the last one, unless the next is the first with a single cell.
+# A round is not made if it is expected to remove a smaller share of the triangles, unless it is the first with a single cell.
 _LEAST_GAIN = 0.02
 
 
@@ -143,7 +143,7 @@ class Rounds:
             return None
         else:
             cells = self._plan.later(present)
-            is_vain = len(made) > 1 and made[-1][1] > (1 - _LEAST_GAIN) * made[-2][1]
+            is_vain = len(made) > 1 and _expected_gain([self._mesh.count, *(count for _, count in made)]) < _LEAST_GAIN
             # The first round with a single cell is never in vain.
             if not cells or (is_vain and (len(cells.boxes) > 1 or made[-1][0] == 1)):
                 return None
@@ -157,6 +157,15 @@ class Rounds:
         for _ in self._each(stage, title, work, missing):
             pass
         return [self._scratch.record(f"{name}_{i:05}") for i in range(len(jobs))]
+
+
+def _expected_gain(counts):
+    """Returns the share of the triangles that the round after the ones that left these counts may remove.
+
+    It falls by about the same factor from round to round. counts: three at least, the first is of the reference.
+    """
+    before, last = (1 - after / count if count else 0 for count, after in zip(counts[-3:-1], counts[-2:]))
+    return last * min(1, last / before) if before > 0 else last
 
 
 def decimate(job, progress=None):
