@@ -56,7 +56,7 @@ def run(source, folder, tolerance, extra):
     return (
         f"{took:.0f}",
         f"{used.ru_utime + used.ru_stime:.0f}",
-        f"{used.ru_maxrss / 1000:,.0f}",
+        f"{used.ru_maxrss * 1024 / 1e6:,.0f}",
         f"{found['output']['triangles']:,}",
         f"{ends[1]} / {ends[2]}",
         rounds,
