@@ -2,9 +2,8 @@
 #include "geometry/morton_order.h"
 
 #include <algorithm>
-#include <array>
-#include <utility>
-#include <vector>
+
+#include "base/distribute.h"
 
 namespace tolvol {
 namespace {
@@ -33,30 +32,11 @@ std::uint64_t morton_code(const glm::dvec3& p) {
 // A radix sort, the least significant digit first.
 void sort_by_code(Unfilled<MortonKey>& keys, Team& team) {
   constexpr int kBits = 11, kDigits = 1 << kBits;
-  // Each part of the keys has its own places for each digit, so that no two threads write to one place.
-  const std::size_t parts = team.size();
-  const auto first_of = [&](std::size_t part) { return keys.size() * part / parts; };
-  std::vector<std::array<std::uint32_t, kDigits>> next(parts);
   Unfilled<MortonKey> sorted(keys.size());
   for (int shift = 0; shift < 63; shift += kBits) {
-    const auto digit = [&](const MortonKey& key) { return key.code >> shift & (kDigits - 1); };
-    team.run(parts, 1, [&](std::size_t part, std::size_t) {
-      next[part].fill(0);
-      for (std::size_t i = first_of(part); i < first_of(part + 1); ++i) {
-        poll_at(i);
-        ++next[part][digit(keys[i])];
-      }
-    });
-    std::uint32_t before = 0;
-    for (int d = 0; d < kDigits; ++d) {
-      for (auto& of_part : next) before += std::exchange(of_part[d], before);
-    }
-    team.run(parts, 1, [&](std::size_t part, std::size_t) {
-      for (std::size_t i = first_of(part); i < first_of(part + 1); ++i) {
-        poll_at(i);
-        sorted[next[part][digit(keys[i])]++] = keys[i];
-      }
-    });
+    distribute(
+        keys.size(), kDigits, team, [&](std::size_t i) { return keys[i].code >> shift & (kDigits - 1); },
+        [&](std::size_t i, std::uint32_t at) { sorted[at] = keys[i]; });
     keys.swap(sorted);
   }
 }

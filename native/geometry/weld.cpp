@@ -6,16 +6,15 @@
 #include <algorithm>
 #include <bit>
 #include <type_traits>
-#include <utility>
 
 #include "base/call.h"
 #include "base/default_init.h"
+#include "base/distribute.h"
 
 namespace tolvol {
 namespace {
 
-constexpr std::size_t kOfGroup = 4096;     // A group has about this many vertices.
-constexpr std::size_t kOfThread = 50'000;  // With fewer vertices a thread would cost more time than it saves.
+constexpr std::size_t kOfGroup = 4096;  // A group has about this many vertices.
 
 struct Item {
   std::uint32_t hash, vertex;
@@ -44,8 +43,9 @@ void weld_group(std::span<const Item> items, std::span<const glm::vec<3, Real>> 
   // The table uses open addressing and is at most half full.
   constexpr std::uint32_t kFree = 0xFFFFFFFFu;
   std::vector<std::uint32_t> first(std::bit_ceil(2 * items.size() + 1), kFree);
+  std::size_t looked_at = 0;
   for (std::uint32_t i = 0; i < items.size(); ++i) {
-    poll_at(i);
+    poll_at(++looked_at);
     const Item& item = items[i];
     const glm::vec<3, Real>& position = vertices[item.vertex];
     if (position != position) {  // What is no number equals nothing, and would fill the table.
@@ -56,7 +56,9 @@ void weld_group(std::span<const Item> items, std::span<const glm::vec<3, Real>> 
     const auto differs = [&](const Item& other) {
       return other.hash != item.hash || vertices[other.vertex] != position;
     };
-    while (first[place] != kFree && differs(items[first[place]])) place = (place + 1) & (first.size() - 1);
+    for (; first[place] != kFree && differs(items[first[place]]); place = (place + 1) & (first.size() - 1)) {
+      poll_at(++looked_at);
+    }
     if (first[place] == kFree) first[place] = i;
     representative[item.vertex] = items[first[place]].vertex;
   }
@@ -68,32 +70,16 @@ std::vector<std::uint32_t> weld(std::span<const glm::vec<3, Real>> vertices, Tea
   const std::size_t groups = std::bit_ceil(1 + count / kOfGroup);
   const int bits = std::countr_zero(groups);
   const auto group_of = [&](std::uint32_t hash) { return std::uint64_t(hash) << bits >> 32; };
-  // Each part of the vertices has its own places in each group, so that no two threads write to one place.
-  const std::size_t parts = std::min(team.size(), 1 + count / kOfThread);
-  std::vector<std::vector<std::uint32_t>> next(parts, std::vector<std::uint32_t>(groups));
   Unfilled<std::uint32_t> hashes(count);
-  const auto for_each_vertex = [&](auto&& use) {
-    team.run(parts, 1, [&](std::size_t part, std::size_t) {
-      for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
-        poll_at(i);
-        use(i, next[part]);
-      }
-    });
-  };
-  for_each_vertex([&](std::size_t i, std::vector<std::uint32_t>& counts) {
-    hashes[i] = hash_of(vertices[i]);
-    ++counts[group_of(hashes[i])];
+  team.run(count, kOfGroup, [&](std::size_t first, std::size_t end) {
+    for (std::size_t i = first; i < end; ++i) hashes[i] = hash_of(vertices[i]);
   });
-  std::uint32_t before = 0;
-  std::vector<std::uint32_t> begin(1, 0);
-  for (std::size_t group = 0; group < groups; ++group) {
-    for (auto& of_part : next) before += std::exchange(of_part[group], before);
-    begin.push_back(before);
-  }
   Unfilled<Item> items(count);
-  for_each_vertex([&](std::size_t i, std::vector<std::uint32_t>& places) {
-    items[places[group_of(hashes[i])]++] = {hashes[i], std::uint32_t(i)};
-  });
+  const std::vector<std::uint32_t> begin = distribute(
+      count, groups, team, [&](std::size_t i) { return group_of(hashes[i]); },
+      [&](std::size_t i, std::uint32_t at) {
+        items[at] = {hashes[i], std::uint32_t(i)};
+      });
   std::vector<std::uint32_t> representative;
   fill(representative, count, 0u);
   team.run(groups, 1, [&](std::size_t group, std::size_t) {

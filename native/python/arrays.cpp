@@ -65,7 +65,7 @@ Storage require_vertices(const py::object& object, const std::string& name) {
 Vertices to_vertices(const py::object& object, const std::string& name) {
   Vertices result;
   result.storage = require_vertices(object, name);
-  const py::array array = to_array(object, name, "(n, 3) float32 or float64");
+  const auto array = py::reinterpret_borrow<py::array>(object);
   result.values.resize(static_cast<std::size_t>(array.shape(0)));
   const auto copy = [&](const auto& view) {
     for (py::ssize_t i = 0; i < view.shape(0); ++i) {
