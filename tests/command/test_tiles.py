@@ -405,15 +405,15 @@ def are_beside_a_side(points, cells, length):
 @pytest.mark.parametrize("size", [(1, 1, 1), (10, 1, 1)])
 @pytest.mark.parametrize("count", [2, 3, 4, 7])
 def test_the_sides_of_cells_keep_away_from_the_faces_beside_those_before(count, size):
-    points = np.random.default_rng(1).uniform(size=(20_000, 3)) * size
+    points, unit = np.random.default_rng(1).uniform(size=(20_000, 3)) * size, max(size) / 1000
     cells = Cells(points, count)
     for _ in range(5):
         # A round leaves small faces beside the sides of its cells, and few others.
-        beside = are_beside_a_side(points, cells, max(size) / count / 20)
+        beside = are_beside_a_side(points, cells, 50 * unit / count)
         small, others = points[beside], points[~beside][::50]
-        boxes = np.concatenate([small - 0.001, others - 0.02]), np.concatenate([small + 0.001, others + 0.02])
+        boxes = np.concatenate([small - unit, others - 20 * unit]), np.concatenate([small + unit, others + 20 * unit])
         cells = Cells(points, count, boxes)
-        assert np.count_nonzero(are_beside_a_side(small, cells, 0.001)) < len(small) / 50
+        assert np.count_nonzero(are_beside_a_side(small, cells, unit)) < len(small) / 50
 
 
 def test_cells_know_how_many_boxes_are_near_them():

@@ -68,8 +68,7 @@ TEST(Weld, ThreadsFindTheSame) {
   for (const unsigned threads : {2u, 3u, 8u}) EXPECT_EQ(weld(vertices, threads), alone);
 }
 
-// The lowest bits of such coordinates are 0. Where all had one place in the table, there would be 2,000,000 polls, or
-// 30,000 under the sanitizers.
+// The lowest bits of such coordinates are 0. A hash that does not bring the others down takes 60,000 polls.
 TEST(Weld, VerticesAlongAnAxisHavePlacesOfTheirOwn) {
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<glm::dvec3> vertices(many(128'000), glm::dvec3(1, 2, 3));
