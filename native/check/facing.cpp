@@ -7,6 +7,7 @@
 #include "check/facing.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -25,6 +26,8 @@ constexpr double kBothNormals = 2.001 * kSureNormal;
 constexpr double kNearEnough = std::numbers::pi / 180;
 /// A face that keeps no smaller angle than this one is free.
 constexpr double kNearlyTurned = 0.99 * std::numbers::pi;
+/// Triangles or nodes that a thread looks at together.
+constexpr std::size_t kBlock = 8192;
 
 /// No dot product of a normal in a box is larger than this by more than kRounding.
 double largest_dot(const RoundedBox& box, const glm::dvec3& normal) {
@@ -61,25 +64,46 @@ double angle_bound(double cosine) {
   return exact + kBothNormals;
 }
 
-FacingRule::FacingRule(const TriangleMesh& reference, double reference_error, double mesh_error, double angle)
-    : mesh_error(mesh_error), angle(angle), least_cosine(tolvol::least_cosine(angle)) {
-  normals.reserve(reference.triangles.size());
-  for (const glm::uvec3& t : reference.triangles) {
-    poll_at(normals.size());
-    const glm::dvec3 &a = reference.vertices[t.x], &b = reference.vertices[t.y], &c = reference.vertices[t.z];
-    const std::optional<glm::dvec3> normal = sure_normal(a, b, c, reference_error);
-    unsure += !normal && glm::cross(b - a, c - a) != glm::dvec3(0);
-    normals.push_back(normal.value_or(glm::dvec3(std::numeric_limits<double>::quiet_NaN())));
-  }
+FacingRule::FacingRule(const TriangleMesh& reference, double reference_error, double mesh_error, double angle,
+                       Team& team)
+    : normals(reference.triangles.size()),
+      mesh_error(mesh_error),
+      angle(angle),
+      least_cosine(tolvol::least_cosine(angle)) {
+  std::atomic<std::size_t> unsure_ones = 0;
+  team.run(normals.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    std::size_t of_block = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      const glm::uvec3& t = reference.triangles[i];
+      const glm::dvec3 &a = reference.vertices[t.x], &b = reference.vertices[t.y], &c = reference.vertices[t.z];
+      const std::optional<glm::dvec3> normal = sure_normal(a, b, c, reference_error);
+      of_block += !normal && glm::cross(b - a, c - a) != glm::dvec3(0);
+      normals[i] = normal.value_or(glm::dvec3(std::numeric_limits<double>::quiet_NaN()));
+    }
+    unsure_ones += of_block;
+  });
+  unsure = unsure_ones;
 }
 
-void FacingRule::bound_normals(const Hierarchy& hierarchy) {
+void FacingRule::bound_normals(const Hierarchy& hierarchy, Team& team) {
   below_.assign(hierarchy.node_count(), {});
-  hierarchy.for_each_below(
-      [&](std::uint32_t node, std::uint32_t triangle) {
-        if (!std::isnan(normals[triangle].x)) below_[node].add(normals[triangle]);
-      },
-      [&](std::uint32_t node, std::uint32_t child) { below_[node].add(below_[child]); });
+  team.run(below_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (auto node = static_cast<std::uint32_t>(begin); node < end; ++node) {
+      Box box;
+      hierarchy.for_each_below(
+          node,
+          [&](std::uint32_t triangle) {
+            if (!std::isnan(normals[triangle].x)) box.add(normals[triangle]);
+          },
+          [](std::uint32_t) {});
+      if (!box.empty()) below_[node].add(box.lower), below_[node].add(box.upper);
+    }
+  });
+  for (std::uint32_t node = hierarchy.node_count(); node-- > 0;) {
+    poll_at(node);
+    hierarchy.for_each_below(
+        node, [](std::uint32_t) {}, [&](std::uint32_t child) { below_[node].add(below_[child]); });
+  }
 }
 
 Hierarchy::Nearest FacingRule::nearest(const Hierarchy& hierarchy, const glm::dvec3& p, const glm::dvec3& normal,

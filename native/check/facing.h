@@ -16,6 +16,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/parallel.h"
 #include "geometry/hierarchy.h"
 #include "geometry/rounded_box.h"
 #include "geometry/triangle_mesh.h"
@@ -37,11 +38,11 @@ double angle_bound(double cosine);
 struct FacingRule {
   /// `angle` is the largest angle that the rule permits, more than 0 and less than pi. Rounding may have moved the
   /// corners of the reference's triangles by `reference_error`, and those of faces by `mesh_error`. O(m).
-  FacingRule(const TriangleMesh& reference, double reference_error, double mesh_error, double angle);
+  FacingRule(const TriangleMesh& reference, double reference_error, double mesh_error, double angle, Team& team);
 
   /// Bounds the normals below each node of the reference's hierarchy, so that nearest() leaves out nodes in which no
   /// triangle faces as it should. It has to be called again once `normals` has changed. O(m).
-  void bound_normals(const Hierarchy& hierarchy);
+  void bound_normals(const Hierarchy& hierarchy, Team& team);
 
   /// Tells of a triangle whether a search may end with it.
   using Enough = std::function<bool(std::uint32_t triangle)>;

@@ -49,11 +49,11 @@ void require_normal_angle(double degrees) {
 }
 
 std::optional<FacingRule> facing_rule(const ToleranceVolume& volume, double mesh_error, double degrees,
-                                      std::vector<std::string>& warnings) {
+                                      std::vector<std::string>& warnings, Team& team) {
   if (degrees >= 180) return std::nullopt;
-  FacingRule rule(volume.reference(), volume.mapping_error(), mesh_error, glm::radians(degrees));
+  FacingRule rule(volume.reference(), volume.mapping_error(), mesh_error, glm::radians(degrees), team);
   if (2 * rule.unsure <= rule.normals.size()) {
-    rule.bound_normals(volume.hierarchy());
+    rule.bound_normals(volume.hierarchy(), team);
     return rule;
   }
   warnings.push_back(

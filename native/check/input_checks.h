@@ -37,6 +37,6 @@ void require_normal_angle(double degrees);
 /// Returns the rule that keeps this angle for a mesh whose mapping error is `mesh_error`. Returns none for 180 degrees,
 /// which keep no angle, and adds a warning and returns none where hardly any face would find a witness.
 std::optional<FacingRule> facing_rule(const ToleranceVolume& volume, double mesh_error, double degrees,
-                                      std::vector<std::string>& warnings);
+                                      std::vector<std::string>& warnings, Team& team);
 
 }  // namespace tolvol

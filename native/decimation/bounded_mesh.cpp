@@ -124,15 +124,20 @@ void BoundedMesh::keep_apart() {
   }
 }
 
-void BoundedMesh::keep_apart(const Regions& regions) {
-  occupied_.assign(regions.count(), {}), occupied_by_.resize(positions_.size());
+void BoundedMesh::keep_apart(const Regions& regions, Team& team) {
+  std::vector<std::vector<std::uint32_t>> vertices(regions.count());  // in the cell of each region
+  occupied_by_.resize(positions_.size());
   for (std::uint32_t v = 0; v < positions_.size(); ++v) {
     occupied_by_[v] = regions.of_vertex(v);
     if (mesh_.status(handle(v)).deleted()) continue;
     Box point;
     point.add(stored_[v]);
-    regions.for_each_meeting(point, [&](std::uint32_t region) { occupied_[region].add(stored_[v]); });
+    regions.for_each_meeting(point, [&](std::uint32_t region) { vertices[region].push_back(v); });
   }
+  occupied_.assign(regions.count(), {});
+  team.run(regions.count(), 1, [&](std::size_t region, std::size_t) {
+    for (const std::uint32_t v : vertices[region]) occupied_[region].add(stored_[v]);
+  });
 }
 
 void BoundedMesh::place(std::uint32_t vertex, const VertexPosition& target) {

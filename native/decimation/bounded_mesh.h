@@ -137,7 +137,7 @@ class BoundedMesh {
   void keep_apart();
   /// From now on no change of a vertex of a region puts it where another vertex in the region's cell is. Each region
   /// may have a thread that applies its changes. O(n).
-  void keep_apart(const Regions& regions);
+  void keep_apart(const Regions& regions, Team& team);
   /// Whether the place of `target` belongs to a vertex other than these two, and vertices are kept apart.
   bool meets_another(const VertexPosition& target, std::uint32_t vertex, std::uint32_t other) const {
     return kept_apart() && target.stored != stored_[vertex] && target.stored != stored_[other] &&

@@ -9,8 +9,14 @@
 #include "decimation/replaced_faces.h"
 
 namespace tolvol {
+namespace {
 
-CertifiedBounds::CertifiedBounds(const Directions& directions, MeshView mesh,
+/// Vertices or faces that a thread looks at together.
+constexpr std::size_t kAtOnce = 1024;
+
+}  // namespace
+
+CertifiedBounds::CertifiedBounds(const Directions& directions, MeshView mesh, Team& team,
                                  std::span<const std::uint32_t> on_reference)
     : directions_(directions), vertices_(mesh.vertices.size()), faces_(mesh.triangles.size()) {
   for (std::size_t f = 0; f < on_reference.size(); ++f) {
@@ -18,16 +24,19 @@ CertifiedBounds::CertifiedBounds(const Directions& directions, MeshView mesh,
     faces_[f] = {0, 0};
     for (int k = 0; k < 3; ++k) vertices_[mesh.triangles[f][k]] = {0, on_reference[f]};
   }
-  for (std::size_t v = 0; v < vertices_.size(); ++v) {
-    poll_at(v);
-    if (vertices_[v].triangle == Hierarchy::kNone) vertices_[v] = forward().point_bound(mesh.vertices[v]);
-  }
+  team.run(vertices_.size(), kAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      if (vertices_[v].triangle == Hierarchy::kNone) vertices_[v] = forward().point_bound(mesh.vertices[v]);
+    }
+  });
   if (!directions_.facing) return;
   rules_.assign(faces_.size(), {directions_.facing->angle, false, false});
-  for (std::uint32_t f = 0; f < faces_.size(); ++f) {
-    const auto [a, b, c] = mesh.corners(f);
-    rules_[f].may_be_unsure = !sure_normal(a, b, c, directions_.facing->mesh_error);
-  }
+  team.run(faces_.size(), kAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t f = begin; f < end; ++f) {
+      const auto [a, b, c] = mesh.corners(f);
+      rules_[f].may_be_unsure = !sure_normal(a, b, c, directions_.facing->mesh_error);
+    }
+  });
 }
 
 bool CertifiedBounds::start(std::uint32_t triangle, const glm::dvec3 (&corners)[3],

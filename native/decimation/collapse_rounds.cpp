@@ -46,7 +46,7 @@ class Rounds {
       : mesh_(mesh),
         crossings_(crossings),
         team_(team),
-        collapse_(mesh),
+        collapse_(mesh, team),
         shared_(collapse_),
         costs_(mesh.connectivity().n_edges()),
         places_(mesh.certified() ? mesh.connectivity().n_faces() : 0),
@@ -65,7 +65,7 @@ class Rounds {
       // The two shares take turns, so that the rims lie elsewhere in the next round.
       const Regions parts(mesh_, std::min(kMostVertices, vertices / kLeastRegions), round % 2 == 0 ? 0.5 : 0.35, team_);
       const std::vector<Members> members = members_of(parts);
-      mesh_.keep_apart(parts);
+      mesh_.keep_apart(parts, team_);
       std::atomic<std::size_t> taken_back = 0;
       team_.run(parts.count(), 1, [&](std::size_t i, std::size_t) {
         const auto region = static_cast<std::uint32_t>(i);
@@ -122,7 +122,7 @@ class Rounds {
  private:
   /// Orders the edges by the faces as they are now, and asks again about those that were refused.
   void begin_anew() {
-    collapse_.sum_quadrics();
+    collapse_.sum_quadrics(team_);
     shared_.ask_again();
   }
 

@@ -188,9 +188,9 @@ Bounds* DecimationInput::set_bounds(Team& team) {
       directions.boundary_backward = &boundary_->backward();
     }
   }
-  facing_ = facing_rule(*volume_, mapping_error_, options_.max_normal_angle, report_.warnings);
+  facing_ = facing_rule(*volume_, mapping_error_, options_.max_normal_angle, report_.warnings, team);
   if (facing_) {
-    if (own_count_ > 0) face_as_cut(cut_, volume_->hierarchy(), *facing_);
+    if (own_count_ > 0) face_as_cut(cut_, volume_->hierarchy(), team, *facing_);
     directions.facing = &*facing_;
   }
   std::vector<std::uint32_t> on_reference;
@@ -198,7 +198,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
     on_reference = cut_.triangle_input;
     for (std::uint32_t& t : on_reference) t = is_of_reference(t) ? t : CutMesh::kNone;
   }
-  certified_.emplace(directions, MeshView{cut_.triangles, positions_}, on_reference);
+  certified_.emplace(directions, MeshView{cut_.triangles, positions_}, team, on_reference);
   // What is proved to face the reference is within the tolerance, and is not proved again.
   std::vector<std::uint8_t> proved;
   if (facing_ && own_count_ < triangles_.size()) proved = face(provable, team);

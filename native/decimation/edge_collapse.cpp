@@ -31,25 +31,39 @@ double length_cost(const glm::dvec3& a, const glm::dvec3& b) {
 
 }  // namespace
 
-EdgeCollapse::EdgeCollapse(BoundedMesh& mesh) : mesh_(mesh) { sum_quadrics(); }
+EdgeCollapse::EdgeCollapse(BoundedMesh& mesh, Team& team) : mesh_(mesh) { sum_quadrics(team); }
 
-void EdgeCollapse::sum_quadrics() {
+void EdgeCollapse::sum_quadrics(Team& team) {
+  const std::size_t count = mesh_.connectivity().n_vertices(), ranges = team.size();
+  quadrics_.assign(count, Quadric());
+  team.run(ranges, 1, [&](std::size_t i, std::size_t) {
+    sum_quadrics_of(static_cast<std::uint32_t>(count * i / ranges),
+                    static_cast<std::uint32_t>(count * (i + 1) / ranges));
+  });
+}
+
+/// Sums the quadrics of the vertices from `first` to before `last`.
+void EdgeCollapse::sum_quadrics_of(std::uint32_t first, std::uint32_t last) {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
-  quadrics_.assign(connectivity.n_vertices(), Quadric());
+  const auto is_in_range = [&](std::uint32_t v) { return first <= v && v < last; };
   for (std::uint32_t i = 0; i < connectivity.n_faces(); ++i) {
     poll_at(i);
     if (!mesh_.alive(i)) continue;
     const glm::uvec3& t = mesh_.triangle(i);
+    if (!is_in_range(t.x) && !is_in_range(t.y) && !is_in_range(t.z)) continue;
     const glm::dvec3 &a = mesh_.position(t.x), &b = mesh_.position(t.y), &c = mesh_.position(t.z);
     const glm::dvec3 normal = glm::cross(b - a, c - a);
     const double length = glm::length(normal);
     if (!(length > 0)) continue;  // A degenerate face has no plane.
     const glm::dvec3 unit = normal / length;
     const Quadric q(unit, -glm::dot(unit, a), 0.5 * length);
-    for (int k = 0; k < 3; ++k) quadrics_[t[k]] += q;
+    for (int k = 0; k < 3; ++k) {
+      if (is_in_range(t[k])) quadrics_[t[k]] += q;
+    }
   }
   for (const auto h : connectivity.halfedges()) {
     if (connectivity.status(h).deleted() || !connectivity.is_boundary(h)) continue;
+    if (!is_in_range(mesh_.from(h)) && !is_in_range(mesh_.to(h))) continue;
     const glm::uvec3& t = mesh_.triangle(static_cast<std::uint32_t>(connectivity.opposite_face_handle(h).idx()));
     const glm::dvec3 &a = mesh_.position(mesh_.from(h)), &b = mesh_.position(mesh_.to(h)), edge = b - a;
     const glm::dvec3 face =
@@ -59,7 +73,9 @@ void EdgeCollapse::sum_quadrics() {
     if (!(length > 0)) continue;
     const glm::dvec3 unit = normal / length;
     const Quadric q(unit, -glm::dot(unit, a), kBoundaryWeight * squared_length(edge));
-    quadrics_[mesh_.from(h)] += q, quadrics_[mesh_.to(h)] += q;
+    for (const std::uint32_t v : {mesh_.from(h), mesh_.to(h)}) {
+      if (is_in_range(v)) quadrics_[v] += q;
+    }
   }
 }
 

@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/parallel.h"
 #include "decimation/bounded_mesh.h"
 #include "decimation/change_trial.h"
 #include "decimation/position_fit.h"
@@ -25,7 +26,7 @@ class EdgeCollapse {
   static constexpr double kNever = std::numeric_limits<double>::infinity();
 
   /// Changes `mesh`, and keeps a reference to it.
-  explicit EdgeCollapse(BoundedMesh& mesh);
+  EdgeCollapse(BoundedMesh& mesh, Team& team);
 
   const BoundedMesh& mesh() const { return mesh_; }
 
@@ -54,12 +55,15 @@ class EdgeCollapse {
   Carried carry_out(Attempt& a);
 
   const Quadric& quadric(std::uint32_t vertex) const { return quadrics_[vertex]; }
-  /// Gives each vertex the quadric of the faces that are around it now, as when this was made. O(n).
-  void sum_quadrics();
+  /// Gives each vertex the quadric of the faces that are around it now, as when this was made. Each thread of the team
+  /// sums those of a range of vertices, so that the sums do not depend on the number of threads. O(n).
+  void sum_quadrics(Team& team);
   /// Puts a quadric back where collapses are taken back.
   void set_quadric(std::uint32_t vertex, const Quadric& quadric) { quadrics_[vertex] = quadric; }
 
  private:
+  void sum_quadrics_of(std::uint32_t first, std::uint32_t last);
+
   using Freedom = BoundedMesh::Freedom;
   /// How an edge would be collapsed: the start of `halfedge` merges into its end, which goes to `position`.
   struct Plan {

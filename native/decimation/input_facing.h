@@ -20,7 +20,7 @@ namespace tolvol {
 /// Turns the normals of a rule to where the triangles of the manifold face that its reference was cut to. Triangles
 /// that the cut dropped or set aside are no witnesses; what covers their points is. `hierarchy` is the reference's.
 /// O(m).
-void face_as_cut(const CutMesh& cut, const Hierarchy& hierarchy, FacingRule& rule);
+void face_as_cut(const CutMesh& cut, const Hierarchy& hierarchy, Team& team, FacingRule& rule);
 
 /// What was found of the faces of a mesh.
 struct InputFacing {

@@ -46,6 +46,8 @@ class Regions {
     std::uint32_t region = kNone;
   };
 
+  template <class Visit>
+  void visit_meeting(const Node& node, const Box& box, Visit& visit) const;
   void cut(const BoundedMesh& mesh, std::vector<std::uint32_t>& vertices, std::size_t most, double first, Team& team);
 
   std::vector<std::uint32_t> of_vertex_;
@@ -55,17 +57,14 @@ class Regions {
 
 template <class Visit>
 void Regions::for_each_meeting(const Box& box, Visit&& visit) const {
-  std::vector<std::uint32_t> stack{0};
-  while (!stack.empty()) {
-    const Node& node = nodes_[stack.back()];
-    stack.pop_back();
-    if (node.below == kNone) {
-      visit(node.region);
-      continue;
-    }
-    if (box.upper[node.axis] >= node.at) stack.push_back(node.below + 1);
-    if (box.lower[node.axis] <= node.at) stack.push_back(node.below);
-  }
+  visit_meeting(nodes_[0], box, visit);
+}
+
+template <class Visit>
+void Regions::visit_meeting(const Node& node, const Box& box, Visit& visit) const {
+  if (node.below == kNone) return visit(node.region);
+  if (box.lower[node.axis] <= node.at) visit_meeting(nodes_[node.below], box, visit);
+  if (box.upper[node.axis] >= node.at) visit_meeting(nodes_[node.below + 1], box, visit);
 }
 
 }  // namespace tolvol

@@ -79,11 +79,11 @@ class Hierarchy {
   Nearest nearest_if(const glm::dvec3& p, Accept&& accept, double radius = std::numeric_limits<double>::infinity(),
                      std::uint32_t hint = kNone, MayAccept&& may_accept = {}, Enough&& enough = {}) const;
 
-  /// Tells what is below each node, all of a node before the node above it: calls triangle(node, index) for triangles,
-  /// in nodes of more than one if the triangle is cut into slices, and child(node, node below) for nodes.
+  /// Tells what is directly below a node: calls triangle(index) for triangles, which are below more than one node if
+  /// they are cut into slices, and child(node below) for nodes, whose numbers are higher than the node's.
   template <class OfTriangle, class OfNode>
-  void for_each_below(OfTriangle&& triangle, OfNode&& child) const;
-  std::size_t node_count() const { return nodes_.size(); }
+  void for_each_below(std::uint32_t node, OfTriangle&& triangle, OfNode&& child) const;
+  std::uint32_t node_count() const { return static_cast<std::uint32_t>(nodes_.size()); }
 
   /// Returns the triangle whose distance from the farthest of `points` (1 to 4 of them) is least, if this distance is
   /// within `radius`. Ties go to the lower index. By convexity the distance holds for the whole convex hull of the
@@ -234,18 +234,16 @@ std::size_t Hierarchy::for_each_within(const glm::dvec3& p, double radius, Visit
 }
 
 template <class OfTriangle, class OfNode>
-void Hierarchy::for_each_below(OfTriangle&& triangle, OfNode&& child) const {
-  for (auto node = static_cast<std::uint32_t>(nodes_.size()); node-- > 0;) {
-    poll_at(node);
-    for (int c = 0; c < kWidth; ++c) {
-      if (nodes_[node].lower[0][c] > nodes_[node].upper[0][c]) continue;  // there is no such child
-      const std::uint32_t below = nodes_[node].child[c];
-      if (!(below & kTriangle)) {
-        child(node, below);
-        continue;
-      }
-      for (std::uint32_t i = triangle_[below & ~kTriangle]; i != kNone; i = twin(i)) triangle(node, i);
+void Hierarchy::for_each_below(std::uint32_t node, OfTriangle&& triangle, OfNode&& child) const {
+  const Node& above = nodes_[node];
+  for (int c = 0; c < kWidth; ++c) {
+    if (above.lower[0][c] > above.upper[0][c]) continue;  // there is no such child
+    const std::uint32_t below = above.child[c];
+    if (!(below & kTriangle)) {
+      child(below);
+      continue;
     }
+    for (std::uint32_t i = triangle_[below & ~kTriangle]; i != kNone; i = twin(i)) triangle(i);
   }
 }
 

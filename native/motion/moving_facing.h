@@ -43,7 +43,7 @@ class MovingFacing {
 
   const FacingRule& rule() const { return rule_; }
   /// Turns the normals of these triangles of the reference, whose hierarchy this is.
-  void reverse_reference(const std::vector<bool>& reversed, const Hierarchy& hierarchy);
+  void reverse_reference(const std::vector<bool>& reversed, const Hierarchy& hierarchy, Team& team);
   FaceRule& of(std::uint32_t face, std::size_t triangle) { return rules_[count_ * face + triangle]; }
   const FaceRule& of(std::uint32_t face, std::size_t triangle) const { return rules_[count_ * face + triangle]; }
 

@@ -174,7 +174,7 @@ class MovingMesh {
   void set_trial_bound(std::uint32_t face, const FaceBound& bound);
   void accept(std::uint32_t face);
   bool is_plainly_oriented(std::span<const std::uint32_t> place) const;
-  void start_facing(FacingRule rule, std::span<const std::uint32_t> place);
+  void start_facing(FacingRule rule, std::span<const std::uint32_t> place, Team& team);
   std::vector<double> balance(std::span<const std::uint32_t> failing) const;
   std::vector<std::uint32_t> compare_sides(std::vector<std::uint32_t> failing, Progress* progress);
   std::vector<std::uint32_t> take_uncertified(std::span<const std::uint32_t> faces, Progress* progress);

@@ -37,8 +37,7 @@ bool MovingMesh::is_plainly_oriented(std::span<const std::uint32_t> place) const
 }
 
 /// Prepares the rules of all faces. Those of the reference itself are their own witnesses.
-void MovingMesh::start_facing(FacingRule rule, std::span<const std::uint32_t> place) {
-  Team team(threads_);
+void MovingMesh::start_facing(FacingRule rule, std::span<const std::uint32_t> place, Team& team) {
   const TriangleMesh& reference = volume_->reference();
   const std::span<const PieceTriangle> triangles = triangles_of(corners());
   // The two triangles of one triangulation of a quad are neighbours, so that a quad is a part of one.
@@ -64,13 +63,13 @@ void MovingMesh::start_facing(FacingRule rule, std::span<const std::uint32_t> pl
   }
   facing_.emplace(std::move(rule), face_count(), corners());
   if (is_reference) {
-    facing_->reverse_reference(sides.reversed, volume_->hierarchy());
+    facing_->reverse_reference(sides.reversed, volume_->hierarchy(), team);
   } else {
     const std::vector<std::uint32_t> same = weld_equal_positions(reference.vertices, team);
     std::vector<glm::uvec3> places;
     places.reserve(reference.triangles.size());
     for (const glm::uvec3& t : reference.triangles) places.emplace_back(same[t.x], same[t.y], same[t.z]);
-    facing_->reverse_reference(orientation(places, same.size(), team).reversed, volume_->hierarchy());
+    facing_->reverse_reference(orientation(places, same.size(), team).reversed, volume_->hierarchy(), team);
   }
   part_.assign(is_plain ? 0 : face_count(), 0);
   parallel_for(face_count(), kManyAtOnce, threads_, [&](std::size_t begin, std::size_t end) {

@@ -107,9 +107,11 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, double m
   trial_distance_.assign(count, 0);
   facing_.reset(), exceeding_.clear();
   max_normal_angle_ = max_normal_angle;
-  std::optional<FacingRule> rule;
-  if (corners_ >= 3) rule = facing_rule(*volume_, mapping_error, max_normal_angle, result.warnings);
-  if (rule) start_facing(std::move(*rule), place);
+  if (corners_ >= 3) {
+    Team team(threads_);
+    std::optional<FacingRule> rule = facing_rule(*volume_, mapping_error, max_normal_angle, result.warnings, team);
+    if (rule) start_facing(std::move(*rule), place, team);
+  }
   const std::vector<std::uint32_t> open =
       select(count, threads_, [&](std::size_t f) { return !is_own(static_cast<std::uint32_t>(f)); });
   measure(open, progress);

@@ -28,7 +28,7 @@ FillingRules::FillingRules(const MeshView& mesh, std::vector<std::uint32_t> plac
   const double mapping_error = space_.mapping_error(used);
   certificate_.emplace(volume_.witnesses(), volume_.grid(), volume_.hierarchy(),
                        volume_.provable(mapping_error) * (1 - kHeadroom), volume_.refutable(mapping_error));
-  facing_ = facing_rule(volume_, mapping_error, max_normal_angle, warnings);
+  facing_ = facing_rule(volume_, mapping_error, max_normal_angle, warnings, team);
   gather_faces(team);
   gather_edges(holes);
 }

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "base/call.h"
+#include "base/default_init.h"
 #include "geometry/triangle_mesh.h"
 #include "geometry/weld.h"
 #include "topology/sides.h"
@@ -63,7 +64,7 @@ class Cutter {
     std::uint32_t triangle;
   };
   /// Lowers first[t] to the first triangle that has the same key as t.
-  void find_first(std::vector<Keyed>& triangles, std::vector<std::uint32_t>& first) const {
+  void find_first(Unfilled<Keyed>& triangles, std::vector<std::uint32_t>& first) const {
     sort_by(
         triangles, weld_.size(), team_, [](const Keyed& t) { return t.key[0]; },
         [](const Keyed& a, const Keyed& b) { return std::tie(a.key, a.triangle) < std::tie(b.key, b.triangle); });
@@ -76,7 +77,8 @@ class Cutter {
   }
 
   void sort_out_triangles() {
-    std::vector<Keyed> turned, same;
+    Unfilled<Keyed> turned, same;
+    same.reserve(input_.size());
     std::vector<std::uint32_t> degenerate;
     for (std::uint32_t i = 0; i < input_.size(); ++i) {
       poll_at(i);
@@ -135,6 +137,7 @@ class Cutter {
     for (const bool by_position : {false, true}) {
       if (by_position && !renamed_) return;  // positions would give the same sides as indices
       std::vector<Side> open;
+      open.reserve(mate_.size());
       for (Side s = 0; s < mate_.size(); ++s) {
         if (mate_[s] == kNone && !is_cut_[s]) open.push_back(s);
       }

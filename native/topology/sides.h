@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <compare>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "base/call.h"
+#include "base/default_init.h"
 #include "base/parallel.h"
 #include "topology/sort_by.h"
 
@@ -31,19 +33,24 @@ inline std::uint64_t pair_key(std::uint32_t a, std::uint32_t b) {
 /// end_of(corner) is the vertex of a corner, a number below `vertices`.
 template <class EndOf, class Visit>
 void by_ends(std::span<const Side> sides, std::size_t vertices, Team& team, EndOf&& end_of, Visit&& visit) {
-  using Keyed = std::pair<std::uint64_t, Side>;
-  std::vector<Keyed> sorted(sides.size());
+  struct Keyed {
+    std::uint64_t ends;
+    Side side;
+    auto operator<=>(const Keyed&) const = default;
+  };
+  Unfilled<Keyed> sorted(sides.size());
   team.run(sides.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
+    for (std::size_t i = begin; i < end; ++i) {
       sorted[i] = {pair_key(end_of(sides[i]), end_of(next_corner(sides[i]))), sides[i]};
+    }
   });
   sort_by(
-      sorted, vertices, team, [](const Keyed& s) { return s.first >> 32; }, std::less<Keyed>());
+      sorted, vertices, team, [](const Keyed& s) { return s.ends >> 32; }, std::less<Keyed>());
   std::vector<Side> alike;
   for (std::size_t i = 0; i < sorted.size(); ++i) {
     poll_at(i);
-    alike.push_back(sorted[i].second);
-    if (i + 1 < sorted.size() && sorted[i + 1].first == sorted[i].first) continue;
+    alike.push_back(sorted[i].side);
+    if (i + 1 < sorted.size() && sorted[i + 1].ends == sorted[i].ends) continue;
     visit(std::as_const(alike));
     alike.clear();
   }

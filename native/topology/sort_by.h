@@ -16,8 +16,8 @@ namespace tolvol {
 /// Sorts things by `before`, which must compare first(thing), a number below `groups`, before anything else. One pass
 /// sorts by this number, and short sorts order the few things that share it. Each thread looks at all things and places
 /// those of a range of groups, about as many as the other threads.
-template <class T, class First, class Before>
-void sort_by(std::vector<T>& things, std::size_t groups, Team& team, First&& first, Before&& before) {
+template <class T, class Allocator, class First, class Before>
+void sort_by(std::vector<T, Allocator>& things, std::size_t groups, Team& team, First&& first, Before&& before) {
   if (things.size() < 2) return;
   const std::size_t ranges = team.size();
   std::vector<std::size_t> border(ranges + 1);
@@ -36,7 +36,7 @@ void sort_by(std::vector<T>& things, std::size_t groups, Team& team, First&& fir
     const auto share = static_cast<std::uint32_t>(things.size() * i / ranges);
     border[i] = static_cast<std::size_t>(std::lower_bound(end.begin(), end.end() - 1, share) - end.begin());
   }
-  std::vector<T> sorted(things.size());
+  std::vector<T, Allocator> sorted(things.size());
   in_ranges([&](std::size_t lower, std::size_t upper) {
     if (lower == upper) return;  // end[lower] belongs to another thread
     const auto at = [&](std::uint32_t i) { return sorted.begin() + static_cast<std::ptrdiff_t>(i); };

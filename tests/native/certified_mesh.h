@@ -41,7 +41,8 @@ struct CertifiedMesh {
       const glm::dvec3 stored = space->store(p);
       return VertexPosition{stored, space->frame(stored)};
     };
-    bounds.emplace(CertifiedBounds::Directions{*certificate, &*coverage}, MeshView{reference.triangles, positions});
+    bounds.emplace(CertifiedBounds::Directions{*certificate, &*coverage}, MeshView{reference.triangles, positions},
+                   team);
     mesh.emplace(std::move(input), &*bounds, team);
   }
 

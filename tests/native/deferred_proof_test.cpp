@@ -63,12 +63,12 @@ struct Worked {
       const dvec3 stored = space->store(p);
       return VertexPosition{stored, space->frame(stored)};
     };
-    facing.emplace(volume->reference(), 1e-15, 1e-15, std::numbers::pi / 2);
+    facing.emplace(volume->reference(), 1e-15, 1e-15, std::numbers::pi / 2, alone);
     CertifiedBounds::Directions directions{*certificate, &*coverage};
     directions.facing = &*facing;
-    bounds.emplace(directions, MeshView{reference.triangles, positions()}, own_triangles());
+    bounds.emplace(directions, MeshView{reference.triangles, positions()}, alone, own_triangles());
     mesh.emplace(std::move(input), &*bounds, alone);
-    collapse.emplace(*mesh);
+    collapse.emplace(*mesh, alone);
     shared.emplace(*collapse);
     parts.emplace(*mesh, 1200, 0.5, alone);
     vertices.resize(parts->count()), faces.resize(parts->count());
@@ -235,9 +235,10 @@ TEST(DeferredProof, LeavesBoundariesWithBoundsToOthers) {
   Worked worked(kTolerance);
   CertifiedBounds::Directions directions{*worked.certificate};
   directions.boundary_forward = &*worked.certificate, directions.boundary_backward = &*worked.coverage;
-  CertifiedBounds bounds(directions, MeshView{worked.reference.triangles, worked.positions()}, worked.own_triangles());
-  BoundedMeshInput input;
   Team alone(1);
+  CertifiedBounds bounds(directions, MeshView{worked.reference.triangles, worked.positions()}, alone,
+                         worked.own_triangles());
+  BoundedMeshInput input;
   input.triangles = worked.reference.triangles;
   input.mates = cut_to_manifold(worked.reference.vertices, worked.reference.triangles, alone).mates;
   for (std::uint32_t v = 0; v < worked.reference.vertices.size(); ++v) {
@@ -246,7 +247,7 @@ TEST(DeferredProof, LeavesBoundariesWithBoundsToOthers) {
   }
   input.pinned.assign(worked.reference.vertices.size(), false);
   BoundedMesh mesh(std::move(input), &bounds, alone);
-  EdgeCollapse collapse(mesh);
+  EdgeCollapse collapse(mesh, alone);
   EXPECT_FALSE(DeferredProof(collapse, mesh, nullptr, worked.vertices[0], worked.faces[0], worked.places).possible());
 }
 

@@ -58,7 +58,8 @@ TEST(Facing, NoLimitAdmitsALargerAngle) {
   shapes::Random random(2);
   const TriangleMesh flat{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.5, 0, 0}}, {{0, 1, 2}, {0, 1, 3}}};
   for (const double limit : {1e-9, 1e-6, 0.01, 0.5, kRight, 2.0, 3.1}) {
-    const FacingRule rule(flat, kError, kError, limit);
+    Team team(2);
+    const FacingRule rule(flat, kError, kError, limit, team);
     int admitted = 0;
     for (int i = 0; i < 2'000; ++i) {
       const double angle = std::min(limit * (1 + 0.2 * (random.share() - 0.5)), std::numbers::pi);
@@ -89,7 +90,8 @@ struct Wall {
                    ToleranceVolume::Options{.precision = 8});
     certificate.emplace(volume->witnesses(), volume->grid(), volume->hierarchy(), volume->provable(kError),
                         volume->frame_tolerance());
-    rule.emplace(volume->reference(), kError, kError, kRight);
+    Team team(2);
+    rule.emplace(volume->reference(), kError, kError, kRight, team);
   }
 
   /// What is proved of a triangle whose corners are in the world, by a hostile hint: the triangle right below it.
@@ -176,10 +178,11 @@ TEST(Facing, FindsTheNearestThatIsAdmitted) {
   shapes::Random random(5);
   const TriangleMesh mesh = shapes::torus(24, 0.1);
   const Hierarchy hierarchy(mesh);
-  FacingRule rule(mesh, kError, kError, kRight);
+  Team team(2);
+  FacingRule rule(mesh, kError, kError, kRight, team);
   for (std::size_t t = 0; t < rule.normals.size(); t += 7) rule.normals[t] = -rule.normals[t];
   rule.normals[3] = dvec3(std::numeric_limits<double>::quiet_NaN());
-  rule.bound_normals(hierarchy);
+  rule.bound_normals(hierarchy, team);
   int found = 0;
   for (int i = 0; i < 2'000; ++i) {
     const dvec3 p = random.point(), normal = glm::normalize(random.point());
@@ -198,11 +201,12 @@ TEST(Facing, FindsTheNearestThatIsAdmitted) {
 TEST(Facing, AMeshThatLooksAwayCostsASearchNothing) {
   const TriangleMesh plate = shapes::grid(100);
   const Hierarchy hierarchy(plate);
-  FacingRule rule(plate, kError, kError, kRight);
+  Team team(2);
+  FacingRule rule(plate, kError, kError, kRight, team);
   const Facing turned(rule, {0, 0, -1}, kRight), tilted(rule, glm::normalize(dvec3(1, 0, -0.1)), kRight);
   const dvec3 p(0.5, 0.5, 0.1);
   EXPECT_GT(turned.nearest(hierarchy, p, 10).nodes, 1'000u) << "what a search costs without the normals' bounds";
-  rule.bound_normals(hierarchy);
+  rule.bound_normals(hierarchy, team);
   for (const Facing& facing : {turned, tilted}) {
     const Hierarchy::Nearest nearest = facing.nearest(hierarchy, p, 10);
     EXPECT_EQ(nearest.triangle, Hierarchy::kNone);
@@ -214,8 +218,9 @@ TEST(Facing, ASearchEndsAtWhatIsEnough) {
   // All of a sphere is about as far from its centre.
   const TriangleMesh sphere = shapes::sphere(60);
   const Hierarchy hierarchy(sphere);
-  FacingRule rule(sphere, kError, kError, kRight);
-  rule.bound_normals(hierarchy);
+  Team team(2);
+  FacingRule rule(sphere, kError, kError, kRight, team);
+  rule.bound_normals(hierarchy, team);
   const Facing facing(rule, {0, 0, 1}, kRight);
   const dvec3 p(0.001, 0.002, 0.003);
   const Hierarchy::Nearest nearest = facing.nearest(hierarchy, p, 2);
@@ -240,8 +245,9 @@ TEST(CertifiedFacing, WhereAllIsNearAProofEndsAtAnyWitness) {
   const DistanceGrid no_grid;  // The hierarchy finds all triangles.
   const TriangleCertificate certificate(volume.witnesses(), no_grid, volume.hierarchy(), volume.provable(0),
                                         volume.refutable(0));
-  FacingRule rule(volume.reference(), kError, kError, kRight);
-  rule.bound_normals(volume.hierarchy());
+  Team team(2);
+  FacingRule rule(volume.reference(), kError, kError, kRight, team);
+  rule.bound_normals(volume.hierarchy(), team);
   const glm::uvec3 no_hints(Hierarchy::kNone);
   const dvec3 unknown(TriangleCertificate::kUnproved);
   const dvec3 corners[3] = {in_frame.frame({-1e-5, -1e-5, 0}), in_frame.frame({1e-5, -1e-5, 0}),

@@ -98,13 +98,17 @@ using Link = std::array<std::uint32_t, 3>;
 /// What is below each node: (the node, a triangle, 0) or (the node, the node below, 1).
 std::vector<Link> links(const Hierarchy& tree) {
   std::vector<Link> found;
-  tree.for_each_below(
-      [&](std::uint32_t node, std::uint32_t triangle) {
-        found.push_back({node, triangle, 0});
-      },
-      [&](std::uint32_t node, std::uint32_t below) {
-        found.push_back({node, below, 1});
-      });
+  for (std::uint32_t node = 0; node < tree.node_count(); ++node) {
+    tree.for_each_below(
+        node,
+        [&](std::uint32_t triangle) {
+          found.push_back({node, triangle, 0});
+        },
+        [&](std::uint32_t below) {
+          EXPECT_GT(below, node);
+          found.push_back({node, below, 1});
+        });
+  }
   return found;
 }
 

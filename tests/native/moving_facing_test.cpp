@@ -69,11 +69,12 @@ TEST(MovingFacing, NoMotionWithinTheRoomExceedsTheAngle) {
   std::normal_distribution<double> normal;
   const auto random = [&] { return dvec3(normal(engine), normal(engine), normal(engine)); };
   double largest_share = 0;
+  Team alone(1);
   for (int shape = 0; shape < 2000; ++shape) {
     dvec3 at[3] = {0.1 * random(), 0.1 * random(), 0.1 * random()};
     if (shape % 2) at[2] = 0.5 * (at[0] + at[1]) + 0.1 * (at[2] - at[0]);  // slivers as well
     const double limit = std::uniform_real_distribution(0.1, 3.0)(engine);
-    MovingFacing facing(FacingRule({{at[0], at[1], at[2]}, {{0, 1, 2}}}, 0, 0, limit), 1, 3);
+    MovingFacing facing(FacingRule({{at[0], at[1], at[2]}, {{0, 1, 2}}}, 0, 0, limit, alone), 1, 3);
     facing.of(0, 0).limit = limit;
     facing.start_own(0, 0, at, sure_normal(at[0], at[1], at[2], 0));
     for (int turn = 0; turn < 20; ++turn) {
@@ -92,7 +93,8 @@ TEST(MovingFacing, NoMotionWithinTheRoomExceedsTheAngle) {
 
 TEST(MovingFacing, WhatTurnsTooFarHasNoRoom) {
   const dvec3 at[3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, over[3] = {{0, 0, 0}, {0, 1, 0}, {1, 0, 0}};
-  MovingFacing facing(FacingRule({{at[0], at[1], at[2]}, {{0, 1, 2}}}, 0, 0, std::numbers::pi / 2), 1, 3);
+  Team alone(1);
+  MovingFacing facing(FacingRule({{at[0], at[1], at[2]}, {{0, 1, 2}}}, 0, 0, std::numbers::pi / 2, alone), 1, 3);
   facing.of(0, 0).limit = std::numbers::pi / 2;
   facing.start_own(0, 0, at, sure_normal(at[0], at[1], at[2], 0));
   double room = 1;

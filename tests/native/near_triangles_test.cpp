@@ -40,8 +40,9 @@ struct Work {
 /// triangles that face to the side of `normal` if there is one.
 Work follow(const TriangleMesh& mesh, std::uint32_t face, int levels, std::optional<dvec3> normal = {}) {
   const Hierarchy hierarchy(mesh);
-  FacingRule rule(mesh, 1e-15, 1e-15, std::numbers::pi / 2);
-  rule.bound_normals(hierarchy);
+  Team alone(1);
+  FacingRule rule(mesh, 1e-15, 1e-15, std::numbers::pi / 2, alone);
+  rule.bound_normals(hierarchy, alone);
   std::optional<Facing> facing;
   if (normal) facing.emplace(rule, *normal, rule.angle);
   const Witnesses witnesses(mesh);

@@ -66,7 +66,7 @@ TEST(Occupied, NoVertexIsPutWhereAnotherIs) {
   input.pinned.assign(both.vertices.size(), false);
   input.store = [&](const dvec3& p) { return VertexPosition{space.store(p), p}; };
   const std::vector<dvec3> positions = space.frame(both.vertices);
-  CertifiedBounds bounds({certificate}, MeshView{both.triangles, positions});
+  CertifiedBounds bounds({certificate}, MeshView{both.triangles, positions}, alone);
   BoundedMesh mesh(std::move(input), &bounds, alone);
 
   // The edge that runs along x to a vertex collapses into the vertex, which goes to a place.
@@ -93,7 +93,7 @@ TEST(Occupied, NoVertexIsPutWhereAnotherIs) {
   const Regions regions(mesh, 120, 0.3, alone);
   ASSERT_EQ(regions.count(), 2u);
   ASSERT_NE(regions.of_vertex(kMiddle), Regions::kNone);
-  mesh.keep_apart(regions);
+  mesh.keep_apart(regions, alone);
   EXPECT_EQ(to(taken), std::pair(ChangeTrial::Outcome::possible, false)) << "in regions, the place is free";
   EXPECT_EQ(to(mesh.vertex_position(above)), std::pair(ChangeTrial::Outcome::refused, true)) << "in regions";
 }

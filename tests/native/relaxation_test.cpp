@@ -119,10 +119,12 @@ TEST(Relaxation, HoldsOpenPointsNearWhatTheFaceMayStandFor) {
   }
   CertifiedMesh c(both, both.vertices, 0.02);
   const double unit = c.certificate->limit();
-  const FacingRule rule(c.volume->reference(), 1e-15, 1e-15, 0.5 * std::numbers::pi);
+  Team alone(1);
+  const FacingRule rule(c.volume->reference(), 1e-15, 1e-15, 0.5 * std::numbers::pi, alone);
   std::vector<dvec3> positions;
   for (std::uint32_t v = 0; v < both.vertices.size(); ++v) positions.push_back(c.mesh->position(v));
-  const CertifiedBounds bounds({*c.certificate, &*c.coverage, nullptr, nullptr, &rule}, {both.triangles, positions});
+  const CertifiedBounds bounds({*c.certificate, &*c.coverage, nullptr, nullptr, &rule}, {both.triangles, positions},
+                               alone);
   Change change(*c.mesh);
   Patch patch;
   patches::gather(*c.mesh, change, patch);
