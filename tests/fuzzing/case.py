@@ -37,6 +37,17 @@ class Case:
             return 0.0
         return float(np.linalg.norm(np.ptp(self.world(self.vertices[self.triangles.ravel()]), axis=0)))
 
+    def longest_diagonal(self):
+        """Returns the longest diagonal, in the world, of the local bounding box of the used vertices: the largest tolerance."""
+        if not len(self.triangles):
+            return 0.0
+        used = self.vertices[self.triangles.ravel()]
+        ends = np.array([used.min(0), used.max(0)], np.float64)
+        return max(
+            float(np.linalg.norm(np.diff(self.world(np.choose([which, 1 - which], ends[:, None])), axis=0)))
+            for which in np.array([(0, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0)])
+        )
+
     def is_limited(self):
         """Whether every call has to end within the time limit.
 

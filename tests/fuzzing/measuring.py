@@ -199,7 +199,7 @@ def hausdorff(run):
         raise Finding("both ways", "hausdorff differs from directed_hausdorff")
     if (both.lower, both.upper) != tuple(max(getattr(way, end) for way in ways[0]) for end in ("lower", "upper")):
         raise Finding("both ways", f"{both.lower} to {both.upper} is not the larger one of the two ways")
-    together = np.concatenate([a[0], b[0]]).astype(np.float64)
+    together = np.concatenate([a[0][a[1].ravel()], b[0][b[1].ravel()]]).astype(np.float64)
     size = np.abs(together).max()
     if not np.ptp(together, axis=0).any():
         size = max(size, 1.0)  # A single point has size 0, with which rounding cannot be compared.

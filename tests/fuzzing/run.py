@@ -129,7 +129,7 @@ def _has_no_area(case):
 
 
 def _is_a_point(case):
-    return case.size() < case.tolerance * 1.0001
+    return case.longest_diagonal() < case.tolerance * 1.0001
 
 
 def _rounds(case, unit):
