@@ -237,8 +237,8 @@ std::optional<Normals> MovingMesh::normals() const {
       if (found) of_face = std::max(of_face, *found);
       is_unsure = is_unsure || !found;
     }
-    if (exceeded) {
-      result.exceeded_after += of_face > angle;
+    if (exceeded && of_face > angle) {
+      ++result.exceeded_after;
     } else if (is_unsure) {
       ++result.unsure;
     } else if (of_face > 0) {

@@ -182,6 +182,23 @@ def test_faces_that_exceed_the_angle_before_are_counted_and_become_no_worse():
     assert smooth.report["normals"]["exceeded_after"] < normals["exceeded_before"] / 2
 
 
+def test_the_largest_angle_is_also_that_of_faces_that_exceeded_it_before():
+    plane = np.array([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], float), np.array([(0, 1, 2), (0, 2, 3)])
+    volume = tolvol.ToleranceVolume(*plane, tolerance=0.5)
+    # The first face lies on the plane, and the second one stands on an edge of it at an angle.
+    triangles = np.array([(0, 1, 2), (1, 0, 3)])
+
+    def standing(degrees):
+        away, up = -np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+        return np.array([(0, 0, 0), (4, 0, 0), (2, 4, 0), (2, 0.2 * away, 0.2 * up)], float)
+
+    result = tolvol.constrain(standing(120), standing(60), triangles, volume, two_sided=False, crossings="allow")
+    np.testing.assert_array_equal(result.vertices, standing(60))
+    normals = result.report["normals"]
+    assert (normals["exceeded_before"], normals["exceeded_after"], normals["unsure"]) == (1, 0, 0)
+    assert 60 - ROUNDING <= normals["largest"] <= 61
+
+
 def test_a_mesh_that_faces_against_the_reference_is_compared_by_its_other_side():
     vertices, triangles, volume, wish = scene()
     result = tolvol.constrain(vertices, wish, triangles[:, ::-1], volume)
