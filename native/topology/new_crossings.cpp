@@ -168,16 +168,12 @@ bool NewCrossings::share_out(const NearFaces& near, std::span<const Face> faces,
                              Trial& trial) const {
   std::vector<std::uint32_t> of_met = origins_of(trial.met_last_, {});
   input_.keep_crossing(of_met);
-  if (of_met.empty()) return false;  // as always in a mesh without crossings
-  struct Member {
-    std::uint32_t input_face, of;
-  };
-  std::vector<Member> members;
-  std::vector<std::uint32_t> owners;
+  if (of_met.empty()) return false;                     // as always in a mesh without crossings
+  std::vector<std::uint32_t> members, holders, owners;  // input faces, the faces that stand for them, places in `faces`
   const auto add_all = [&](std::uint32_t face, std::uint32_t of, std::uint32_t owner) {
     std::vector<std::uint32_t> crossing = origins_of(face, {});
     input_.keep_crossing(crossing);
-    for (const std::uint32_t i : crossing) members.push_back({i, of}), owners.push_back(owner);
+    for (const std::uint32_t i : crossing) members.push_back(i), holders.push_back(of), owners.push_back(owner);
   };
   for (std::uint32_t i = 0; i < faces.size(); ++i) add_all(faces[i].id, faces[i].id, i);
   for (const Removed& r : removed) {
@@ -185,7 +181,7 @@ bool NewCrossings::share_out(const NearFaces& near, std::span<const Face> faces,
     add_all(r.id, r.successor,
             at == faces.end() ? Succession::kOutside : static_cast<std::uint32_t>(at - faces.begin()));
   }
-  if (members.empty()) return false;
+  if (members.empty() || input_.which_crossed(members, of_met).empty()) return false;
 
   Succession succession(owners);
   const Ring ring{faces, trial.boxes_, trial.ring_, trial.hub_};
@@ -194,7 +190,7 @@ bool NewCrossings::share_out(const NearFaces& near, std::span<const Face> faces,
     for (std::uint32_t a = 0; a < members.size(); ++a) {
       if (owners[a] != i) continue;
       for (std::uint32_t b = 0; b < members.size(); ++b) {
-        if (owners[b] != k || !input_.crossed(members[a].input_face, members[b].input_face)) continue;
+        if (owners[b] != k || !input_.crossed(members[a], members[b])) continue;
         succession.keep(a), succession.keep(b);
         return true;
       }
@@ -213,10 +209,8 @@ bool NewCrossings::share_out(const NearFaces& near, std::span<const Face> faces,
     std::vector<std::uint32_t> origins = origins_of(other, {});
     input_.keep_crossing(origins);
     pairs += origins.size() * members.size();
-    std::vector<std::uint32_t> of_other;
-    for (std::uint32_t m = 0; m < members.size() && pairs <= kMostPairs; ++m) {
-      if (input_.any_crossed({&members[m].input_face, 1}, origins)) of_other.push_back(m);
-    }
+    if (pairs > kMostPairs) return false;
+    const std::vector<std::uint32_t> of_other = input_.which_crossed(members, origins);
     if (of_other.empty()) return false;
     for (const std::uint32_t i : crossing) succession.need(i, of_other);
   }
@@ -224,7 +218,7 @@ bool NewCrossings::share_out(const NearFaces& near, std::span<const Face> faces,
   if (!found) return false;
   for (std::size_t m = 0; m < members.size(); ++m) {
     if ((*found)[m] == owners[m]) continue;
-    trial.given_.push_back({members[m].input_face, members[m].of, faces[(*found)[m]].id});
+    trial.given_.push_back({members[m], holders[m], faces[(*found)[m]].id});
   }
   return true;
 }
