@@ -99,6 +99,7 @@ BAD_FILES = {
         + bytes(2),
         ["vertex 3", "not finite"],
     ),
+    "marked.obj": (b"\xef\xbb\xbfv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n", ["byte order mark", "UTF-8 without"]),
     "words.obj": (b"v 0 0 0\nv 1 0 0\nv 0 hello 0\nf 1 2 3\n", ["vertex 3", "hello"]),
     "out of range.ply": (ply(SQUARE, ["0 1 2", "0 2 9"]), ["face 2", "vertex 9", "only 4"]),
     "out of range.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 7\n", ["face 2", "vertex 7", "only 3"]),

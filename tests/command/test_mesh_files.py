@@ -304,6 +304,23 @@ def test_polygons_are_said_to_be_cut(tmp_path):
 # Damage -----------------------------------------------------------------------------------------------------------------
 
 
+def text_of(face="3 0 1 2", of_face="property list uchar int vertex_indices"):
+    """Returns a PLY file of a triangle."""
+    of_vertex = "".join(f"property float {axis}\n" for axis in "xyz")
+    head = f"ply\nformat ascii 1.0\nelement vertex 3\n{of_vertex}element face 1\n{of_face}\nend_header\n"
+    return f"{head}1 0 0\n1 1 0\n1 0 1\n{face}\n".encode()
+
+
+def test_an_obj_file_may_begin_with_a_byte_order_mark(tmp_path):
+    scan(tmp_path / "plain.obj")
+    data = (tmp_path / "plain.obj").read_bytes()
+    assert data.startswith(b"v ")
+    (tmp_path / "marked.obj").write_bytes(b"\xef\xbb\xbf" + data)
+    plain, marked = (mesh_files.read(tmp_path / name).objects[0] for name in ("plain.obj", "marked.obj"))
+    np.testing.assert_array_equal(marked.vertices, plain.vertices)
+    np.testing.assert_array_equal(marked.triangles, plain.triangles)
+
+
 def damaged(tmp_path):
     """Yields (name of a damaged file, a part of the message)."""
     whole = {}
@@ -335,6 +352,12 @@ def damaged(tmp_path):
     yield "nan.off", b"\n".join([*off[:9], b"0 inf 0", *off[10:]]), "vertex 8 is not finite"
     yield "word.off", b"\n".join([*off[:9], b"0 x 0", *off[10:]]), "vertex 8 is not three numbers (0 x 0)"
     yield "index.off", whole[".off"].replace(b"\n3 0 ", b"\n3 7777 ", 1), "names vertex 7777"
+    for name, wrong in (("size", b"\n3.5 0 "), ("corner", b"\n3 0.5 ")):
+        yield f"{name}.off", whole[".off"].replace(b"\n3 0 ", wrong, 1), "is not a list of vertices (3"
+    for name, face in (("endless", "inf 0 1 2"), ("nan", "nan 0 1 2")):
+        yield f"{name} list.ply", text_of(face), "ends inside its list of face"
+    yield "scalar.ply", text_of("3", "property int vertex_indices"), "its faces name no vertices"
+    yield "lists.ply", text_of().replace(b"float x", b"list uchar float x"), "its vertices have no x, y, z"
     yield "nan.obj", whole[".obj"].replace(b"v ", b"v nan 0 0\nv ", 1), "vertex 1 is not finite"
     yield (
         "none.ply",

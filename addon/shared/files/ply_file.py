@@ -44,10 +44,10 @@ def read(data):
     for name, count, properties in elements:
         try:
             rows, offset = _ply_element(body, offset, count, properties, order)
-        except (ValueError, struct.error):
+        except (ValueError, OverflowError, struct.error):  # OverflowError: an endless list
             raise Refused(f"the file ends inside its list of {name} elements") from None
         if name == "vertex":
-            if not {"x", "y", "z"} <= rows.keys():
+            if not all(_is_column(rows.get(axis)) for axis in "xyz"):
                 raise Refused("its vertices have no x, y, z")
             vertices = _positions(rows, np.float64 if wide else np.float32)
             require_finite(vertices)
@@ -90,7 +90,7 @@ def _is_column(values):
 
 def _corners(indices):
     """Returns the vertex at each corner, one polygon after another, and the numbers of corners: one if they are equal."""
-    if indices is None or not isinstance(indices, tuple) and not indices.size:
+    if indices is None or not isinstance(indices, tuple) and (indices.ndim < 2 or not indices.size):
         raise Refused("its faces name no vertices")
     if isinstance(indices, tuple) and not indices[1].all():
         # Where the header declares a vertex too many, the first face begins late and looks like this.

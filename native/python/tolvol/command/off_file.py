@@ -47,11 +47,14 @@ def _faces(lines):
         for line, begin, width in zip(lines, begins, widths):
             if (one := numbers(line, np.float64)) is not None and len(one) == width:
                 words[begin : begin + width] = one
-    sizes = words[begins].astype(np.int64)
-    bad = np.flatnonzero((sizes < 0) | (widths <= sizes))
+    first = words[begins]
+    is_bad = (first < 0) | (widths <= first) | (first != np.rint(first))
+    within, sizes = np.arange(len(words)) - np.repeat(begins, widths), np.where(is_bad, 0, first).astype(np.int64)
+    is_corner = (within > 0) & (within <= np.repeat(sizes, widths))
+    fractions = np.flatnonzero(is_corner & (words != np.rint(words)))
+    is_bad[np.searchsorted(begins, fractions, "right") - 1] = True
+    bad = np.flatnonzero(is_bad)
     if len(bad):
         line = lines[bad[0]].decode(errors="replace").strip()
         raise Refused(f"face {bad[0] + 1} is not a list of vertices ({line})")
-    within = np.arange(len(words)) - np.repeat(begins, widths)
-    corners = words[(within > 0) & (within <= np.repeat(sizes, widths))].astype(np.int64)
-    return corners, sizes, bool((widths > sizes + 1).any())
+    return words[is_corner].astype(np.int64), sizes, bool((widths > sizes + 1).any())
