@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The parts of a decimation in cells: reading in blocks, cells, clipping, chunks and one cell's work."""
 
+import math
+
 import numpy as np
 import pytest
 import tolvol
@@ -350,14 +352,19 @@ def test_a_face_whose_centroid_is_rounded_into_another_cell_is_kept(tmp_path):
 # The plan -------------------------------------------------------------------------------------------------------------
 
 
+def memory_for(of_triangles):
+    """Returns the memory that leaves so many bytes for the triangles of a cell if the grid takes all that it may."""
+    return plan.FIXED + math.ceil(of_triangles / (1 - plan.OF_GRID))
+
+
 def test_the_cells_fit_the_memory_and_the_last_round_is_whole_if_it_can_be(tmp_path):
     vertices, triangles = noisy()
     mesh = MappedMesh(written(tmp_path / "a.ply", vertices, triangles))
     everything = chunks.write(tmp_path / "everything", vertices[triangles])
     little = chunks.write(tmp_path / "little", vertices[triangles][::20])
 
-    def cells(memory, left):
-        planned = plan.Plan(mesh, 0.01, plan.FIXED + memory)
+    def cells(of_triangles, left):
+        planned = plan.Plan(mesh, 0.01, memory_for(of_triangles))
         return len(planned.first.boxes), len(planned.later([left]).boxes)
 
     assert cells(mesh.count * plan.OF_FIRST_IF_SHORT, everything)[0] == 1
@@ -377,16 +384,26 @@ def test_there_are_no_cells_for_a_later_round_that_cannot_fit_the_memory(tmp_pat
     crowded = chunks.write(tmp_path / "crowded", np.concatenate([vertices[triangles][:1]] * 2000))
     planned = plan.Plan(mesh, 0.01, plan.FIXED + 1000 * plan.OF_FIRST_IF_SHORT)
     assert planned.later([crowded]) is None
-    assert planned.needed([crowded]) == plan.FIXED + mesh.count * plan.OF_REFERENCE + 2000 * plan.OF_MESH
+    needed = mesh.count * plan.OF_REFERENCE + 2000 * plan.OF_MESH
+    assert plan.FIXED + needed < planned.needed([crowded]) <= memory_for(needed)
 
 
 def test_a_short_tolerance_needs_more_memory(tmp_path):
     mesh = MappedMesh(written(tmp_path / "a.ply", *noisy()))
 
     def count(tolerance):
-        return len(plan.Plan(mesh, tolerance, plan.FIXED + mesh.count * plan.OF_FIRST).first.boxes)
+        return len(plan.Plan(mesh, tolerance, memory_for(mesh.count * plan.OF_FIRST)).first.boxes)
 
     assert count(0.02) == 1 and count(0.01) > 1
+
+
+def test_a_small_grid_leaves_more_memory_to_the_triangles(tmp_path):
+    mesh = MappedMesh(written(tmp_path / "a.ply", *noisy()))
+
+    def count(tolerance):
+        return len(plan.Plan(mesh, tolerance, plan.FIXED + mesh.count * plan.OF_FIRST * 11 // 10).first.boxes)
+
+    assert count(0.2) == 1 and count(0.02) > 1
 
 
 def test_too_little_memory_is_refused_with_what_is_needed(tmp_path):

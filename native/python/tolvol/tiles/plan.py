@@ -9,13 +9,14 @@ import numpy as np
 from ..shared.errors import Refused
 from .cells import Box, Cells, centroids, lowest_and_highest
 
-# What the work in a cell takes at its peak, in bytes (docs/benchmark.md). FIXED: by itself. OF_FIRST: for each triangle in the
-# first round, where the mesh is the reference. OF_FIRST_IF_SHORT: in place of OF_FIRST where the tolerance is short, because
-# more triangles of the reference are cut into pieces then. OF_REFERENCE, OF_MESH: for each triangle of these in later rounds.
-FIXED, OF_FIRST, OF_FIRST_IF_SHORT, OF_REFERENCE, OF_MESH = 160 << 20, 1000, 2000, 430, 2450
+# What the work in a cell takes at its peak, in bytes (docs/benchmark.md), besides the grid of distances. FIXED: by itself.
+# OF_FIRST: for each triangle in the first round, where the mesh is the reference. OF_FIRST_IF_SHORT: in place of OF_FIRST where
+# the tolerance is short, because more triangles of the reference are cut into pieces then. OF_REFERENCE, OF_MESH: for each
+# triangle of these in later rounds.
+FIXED, OF_FIRST, OF_FIRST_IF_SHORT, OF_REFERENCE, OF_MESH = 160 << 20, 750, 1500, 330, 1840
 _SHORT = 1 / 4  # A tolerance below this share of the median edge is short.
-# This share of the memory beside FIXED may be the grid of distances, which these bytes include.
-OF_GRID = 1 / 4
+OF_GRID = 1 / 4  # The grid of distances may take this share of the memory beside FIXED.
+_OF_NODE = 10  # bytes of a node of the grid: 8, and more where rows are filled up
 
 _SAMPLES = 1 << 19  # triangles that stand for all
 _RUN = 1 << 10  # neighbouring triangles that are sampled together
@@ -34,6 +35,7 @@ class Plan:
     def __init__(self, mesh, tolerance, memory):
         self._tolerance, self._memory = tolerance, memory
         corners = _samples(mesh)
+        self._finest_grid = _grid_bytes(np.ptp(corners.reshape(-1, 3).astype(np.float64), axis=0), tolerance)
         self._points = centroids(corners)
         of_each = OF_FIRST_IF_SHORT if tolerance < _SHORT * _median_edge(corners) else OF_FIRST
         self._reference = _Load.of(corners, mesh.count, of_each)
@@ -41,7 +43,7 @@ class Plan:
         if not cells:
             raise Refused(
                 f"--memory: {memory // 1_000_000:,} MB is too little: the triangles within the tolerance of one place need at "
-                f"least {math.ceil((FIXED + needed) / 1e6):,} MB"
+                f"least {math.ceil((FIXED + self._with_grid(needed)) / 1e6):,} MB"
             )
         self.first = cells
 
@@ -61,7 +63,8 @@ class Plan:
 
     def needed(self, chunks):
         """Returns the bytes with which the round after the one that has left these chunks would have a single cell."""
-        return FIXED + self._reference.count * OF_REFERENCE + sum(chunk.count for chunk in chunks) * OF_MESH
+        of_triangles = self._reference.count * OF_REFERENCE + sum(chunk.count for chunk in chunks) * OF_MESH
+        return FIXED + math.ceil(self._with_grid(of_triangles))
 
     def parts(self, count):
         """Returns `count` Cells for the chunks of the reference."""
@@ -69,14 +72,18 @@ class Plan:
 
     def grid_memory(self):
         """Returns the most bytes that the grid of a cell's volume may take."""
-        return max(0, int((self._memory - FIXED) * OF_GRID))
+        return int(min(max(0, self._memory - FIXED) * OF_GRID, self._finest_grid))
+
+    def _with_grid(self, needed):
+        """Returns the bytes beside FIXED with which so many are left beside the grid."""
+        return needed + min(needed * OF_GRID / (1 - OF_GRID), self._finest_grid)
 
     def _fewest(self, loads, boxes=None):
         """Returns (few Cells, each of which fits, or None; the least bytes that were found to be needed).
 
         boxes: as Cells takes them.
         """
-        room = max(0, self._memory - FIXED)
+        room = max(0, self._memory - FIXED - self.grid_memory())
         # Where not even FIXED is there, no cells will do, and the need of small ones is told.
         wanted, finest = (room, _FINEST) if room else (_SMALL * self._reference.of_each, 1)
         points = self._points
@@ -127,6 +134,14 @@ class _Load:
 
     def _bytes_of(self, counts):
         return counts * (self.bytes / max(1, len(self.lowest)))
+
+
+def _grid_bytes(extent, tolerance):
+    """Returns the bytes of the finest grid that a volume takes by itself, with a node per tolerance, around a box of this extent.
+
+    The grid of a cell has fewer nodes.
+    """
+    return _OF_NODE * float(np.prod(extent / tolerance + 8))  # The band around the box is less than 3 tolerances wide.
 
 
 def _median_edge(corners):
