@@ -13,6 +13,7 @@
 #include <numbers>
 
 #include "base/call.h"
+#include "base/parallel.h"
 #include "geometry/frame.h"
 
 namespace tolvol {
@@ -26,7 +27,7 @@ constexpr double kBothNormals = 2.001 * kSureNormal;
 constexpr double kNearEnough = std::numbers::pi / 180;
 /// A face that keeps no smaller angle than this one is free.
 constexpr double kNearlyTurned = 0.99 * std::numbers::pi;
-/// Triangles or nodes that a thread looks at together.
+/// A thread takes so many triangles or nodes at once: about a millisecond of work between two polls.
 constexpr std::size_t kBlock = 8192;
 
 /// No dot product of a normal in a box is larger than this by more than kRounding.
@@ -66,10 +67,8 @@ double angle_bound(double cosine) {
 
 FacingRule::FacingRule(const TriangleMesh& reference, double reference_error, double mesh_error, double angle,
                        Team& team)
-    : normals(reference.triangles.size()),
-      mesh_error(mesh_error),
-      angle(angle),
-      least_cosine(tolvol::least_cosine(angle)) {
+    : mesh_error(mesh_error), angle(angle), least_cosine(tolvol::least_cosine(angle)) {
+  fill(normals, reference.triangles.size(), glm::dvec3(0));
   std::atomic<std::size_t> unsure_ones = 0;
   team.run(normals.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     std::size_t of_block = 0;
@@ -90,7 +89,7 @@ void FacingRule::bound_normals(const Hierarchy& hierarchy, Team& team) {
   team.run(below_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     for (auto node = static_cast<std::uint32_t>(begin); node < end; ++node) {
       Box box;
-      hierarchy.for_each_below(
+      hierarchy.for_each_child(
           node,
           [&](std::uint32_t triangle) {
             if (!std::isnan(normals[triangle].x)) box.add(normals[triangle]);
@@ -101,7 +100,7 @@ void FacingRule::bound_normals(const Hierarchy& hierarchy, Team& team) {
   });
   for (std::uint32_t node = hierarchy.node_count(); node-- > 0;) {
     poll_at(node);
-    hierarchy.for_each_below(
+    hierarchy.for_each_child(
         node, [](std::uint32_t) {}, [&](std::uint32_t child) { below_[node].add(below_[child]); });
   }
 }

@@ -16,12 +16,13 @@
 #include <optional>
 #include <vector>
 
-#include "base/parallel.h"
 #include "geometry/hierarchy.h"
 #include "geometry/rounded_box.h"
 #include "geometry/triangle_mesh.h"
 
 namespace tolvol {
+
+class Team;  // base/parallel.h
 
 /// The sine of the angle by which a normal that is used may be wrong.
 inline constexpr double kSureNormal = 0x1p-24;
@@ -37,11 +38,13 @@ double angle_bound(double cosine);
 /// The rule that the normal of every witness is within an angle of the face's normal.
 struct FacingRule {
   /// `angle` is the largest angle that the rule permits, more than 0 and less than pi. Rounding may have moved the
-  /// corners of the reference's triangles by `reference_error`, and those of faces by `mesh_error`. O(m).
+  /// corners of the reference's triangles by `reference_error`, and those of faces by `mesh_error`. O(m), shared by the
+  /// threads of the team.
   FacingRule(const TriangleMesh& reference, double reference_error, double mesh_error, double angle, Team& team);
 
   /// Bounds the normals below each node of the reference's hierarchy, so that nearest() leaves out nodes in which no
-  /// triangle faces as it should. It has to be called again once `normals` has changed. O(m).
+  /// triangle faces as it should. It has to be called again once a normal was turned; a normal that becomes NaN only
+  /// leaves the bounds wider than they need be. O(m), shared by the threads of the team.
   void bound_normals(const Hierarchy& hierarchy, Team& team);
 
   /// Tells of a triangle whether a search may end with it.

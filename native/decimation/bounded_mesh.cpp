@@ -120,23 +120,25 @@ BoundedMesh::Merge BoundedMesh::merge(Edge e) const {
 void BoundedMesh::keep_apart() {
   occupied_.assign(1, {}), occupied_by_.assign(positions_.size(), 0);
   for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+    poll_at(v);
     if (!mesh_.status(handle(v)).deleted()) occupied_[0].add(stored_[v]);
   }
 }
 
 void BoundedMesh::keep_apart(const Regions& regions, Team& team) {
-  std::vector<std::vector<std::uint32_t>> vertices(regions.count());  // in the cell of each region
+  std::vector<std::vector<std::uint32_t>> in_cell(regions.count());  // per region: the vertices in its cell
   occupied_by_.resize(positions_.size());
   for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+    poll_at(v);
     occupied_by_[v] = regions.of_vertex(v);
     if (mesh_.status(handle(v)).deleted()) continue;
     Box point;
     point.add(stored_[v]);
-    regions.for_each_meeting(point, [&](std::uint32_t region) { vertices[region].push_back(v); });
+    regions.for_each_meeting(point, [&](std::uint32_t region) { in_cell[region].push_back(v); });
   }
   occupied_.assign(regions.count(), {});
   team.run(regions.count(), 1, [&](std::size_t region, std::size_t) {
-    for (const std::uint32_t v : vertices[region]) occupied_[region].add(stored_[v]);
+    for (const std::uint32_t v : in_cell[region]) occupied_[region].add(stored_[v]);
   });
 }
 

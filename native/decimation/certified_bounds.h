@@ -34,7 +34,8 @@ class CertifiedBounds final : public Bounds {
   };
   /// Makes the bounds for a mesh before any change. `on_reference` has the triangle of the reference that each triangle
   /// is, or Hierarchy::kNone; or it is empty if they are no triangles of it. Keeps references to the checks and the
-  /// rule. About 1 us for each vertex that is on no triangle of the reference, shared by the threads of the team.
+  /// rule. Takes about 1 us for each vertex that is on no triangle of the reference; the threads of the team share
+  /// this.
   CertifiedBounds(const Directions& directions, MeshView mesh, Team& team,
                   std::span<const std::uint32_t> on_reference = {});
 

@@ -42,7 +42,8 @@ void EdgeCollapse::sum_quadrics(Team& team) {
   });
 }
 
-/// Sums the quadrics of the vertices from `first` to before `last`.
+/// Sums the quadrics of the vertices from `first` to before `last`. Every thread looks at all faces and adds only to
+/// vertices of its own range, so that each vertex sums in the order of the faces.
 void EdgeCollapse::sum_quadrics_of(std::uint32_t first, std::uint32_t last) {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
   const auto is_in_range = [&](std::uint32_t v) { return first <= v && v < last; };
@@ -62,6 +63,7 @@ void EdgeCollapse::sum_quadrics_of(std::uint32_t first, std::uint32_t last) {
     }
   }
   for (const auto h : connectivity.halfedges()) {
+    poll_at(static_cast<std::size_t>(h.idx()));
     if (connectivity.status(h).deleted() || !connectivity.is_boundary(h)) continue;
     if (!is_in_range(mesh_.from(h)) && !is_in_range(mesh_.to(h))) continue;
     const glm::uvec3& t = mesh_.triangle(static_cast<std::uint32_t>(connectivity.opposite_face_handle(h).idx()));

@@ -32,7 +32,7 @@ std::vector<std::uint32_t> connected_parts(const CutMesh& cut) {
 
 void face_as_cut(const CutMesh& cut, const Hierarchy& hierarchy, Team& team, FacingRule& rule) {
   std::vector<bool> is_in_cut(rule.normals.size(), false);
-  bool any = false;  // whether a normal is changed
+  bool any = false;  // whether a normal is turned
   for (std::uint32_t t = 0; t < cut.triangles.size(); ++t) {
     poll_at(t);
     const std::uint32_t input = cut.triangle_input[t];
@@ -41,7 +41,8 @@ void face_as_cut(const CutMesh& cut, const Hierarchy& hierarchy, Team& team, Fac
     if (cut.reversed[t]) rule.normals[input] = -rule.normals[input], any = true;
   }
   for (std::size_t i = 0; i < is_in_cut.size(); ++i) {
-    if (!is_in_cut[i]) rule.normals[i] = glm::dvec3(std::numeric_limits<double>::quiet_NaN()), any = true;
+    poll_at(i);
+    if (!is_in_cut[i]) rule.normals[i] = glm::dvec3(std::numeric_limits<double>::quiet_NaN());
   }
   if (any) rule.bound_normals(hierarchy, team);
 }

@@ -49,7 +49,7 @@ DistanceGrid layout_grid(const Box& box, double tolerance, std::optional<double>
   }
   const Layout l =
       layout(box, tolerance, precision.value_or(precision_that_fits(box, tolerance, kFinestPrecision, most)));
-  if (precision && l.bytes() > kGridBudget) {  // Without a precision it fits `most`.
+  if (precision && l.bytes() > kGridBudget) {  // Without one, precision_that_fits() has chosen one that fits.
     std::ostringstream text;
     text << "a precision of " << *precision << " needs a grid of " << l.bytes() / (1 << 20) << " MB, the limit is "
          << (kGridBudget >> 20) << " MB; precision " << precision_that_fits(box, tolerance, *precision) << " fits";

@@ -82,7 +82,7 @@ class Hierarchy {
   /// Tells what is directly below a node: calls triangle(index) for triangles, which are below more than one node if
   /// they are cut into slices, and child(node below) for nodes, whose numbers are higher than the node's.
   template <class OfTriangle, class OfNode>
-  void for_each_below(std::uint32_t node, OfTriangle&& triangle, OfNode&& child) const;
+  void for_each_child(std::uint32_t node, OfTriangle&& triangle, OfNode&& child) const;
   std::uint32_t node_count() const { return static_cast<std::uint32_t>(nodes_.size()); }
 
   /// Returns the triangle whose distance from the farthest of `points` (1 to 4 of them) is least, if this distance is
@@ -234,7 +234,7 @@ std::size_t Hierarchy::for_each_within(const glm::dvec3& p, double radius, Visit
 }
 
 template <class OfTriangle, class OfNode>
-void Hierarchy::for_each_below(std::uint32_t node, OfTriangle&& triangle, OfNode&& child) const {
+void Hierarchy::for_each_child(std::uint32_t node, OfTriangle&& triangle, OfNode&& child) const {
   const Node& above = nodes_[node];
   for (int c = 0; c < kWidth; ++c) {
     if (above.lower[0][c] > above.upper[0][c]) continue;  // there is no such child

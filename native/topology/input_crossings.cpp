@@ -9,10 +9,10 @@
 namespace tolvol {
 namespace {
 
-/// All faces that a face crosses are found once it was asked about kMany others, or about the kManyShare-th part of all
-/// faces if that is more: to find them takes some times as long as this.
-constexpr std::size_t kMany = 1024, kManyShare = 16;
-/// So many faces in the lists of what a face crosses take 64 MB.
+/// After so many pairs with a face, or pairs for this share of all faces if that is more, all that it crosses is found.
+/// This search costs at most a test of each face of the mesh: kManyAskedShare times as many as were made by then.
+constexpr std::size_t kManyAsked = 1024, kManyAskedShare = 16;
+/// The lists hold at most about so many faces, in 64 MB, so that they stay small beside the mesh.
 constexpr std::size_t kMostInLists = 1 << 24;
 
 }  // namespace
@@ -42,20 +42,22 @@ bool InputCrossings::any_crossed(std::span<const std::uint32_t> a, std::span<con
   if (some_a.empty()) return false;
   keep_crossing(some_b);
   if (some_b.empty()) return false;
-  return first_crossed(some_a, boxed(some_b), 0) < some_a.size();
+  std::size_t turn = 0;
+  return first_crossed(some_a, boxed(some_b), 0, turn) < some_a.size();
 }
 
 std::vector<std::uint32_t> InputCrossings::which_crossed(std::span<const std::uint32_t> a,
                                                          std::span<const std::uint32_t> b) const {
   const std::vector<Boxed> others = boxed(b);
   std::vector<std::uint32_t> found;
-  for (std::size_t i = 0; (i = first_crossed(a, others, i)) < a.size(); ++i) {
+  std::size_t turn = 0;
+  for (std::size_t i = 0; (i = first_crossed(a, others, i, turn)) < a.size(); ++i) {
     found.push_back(static_cast<std::uint32_t>(i));
   }
   return found;
 }
 
-/// Some faces in rising order.
+/// The faces with their corners and boxes, in rising order of their numbers.
 std::vector<InputCrossings::Boxed> InputCrossings::boxed(std::span<const std::uint32_t> faces) const {
   std::vector<Boxed> found;
   found.reserve(faces.size());
@@ -68,10 +70,9 @@ std::vector<InputCrossings::Boxed> InputCrossings::boxed(std::span<const std::ui
 }
 
 /// The first place from `first` on of a face that crossed one of the others, as boxed() returns them, or the number of
-/// faces.
+/// faces. `turn` counts the steps since the last poll.
 std::size_t InputCrossings::first_crossed(std::span<const std::uint32_t> faces, std::span<const Boxed> others,
-                                          std::size_t first) const {
-  std::size_t turn = 0;
+                                          std::size_t first, std::size_t& turn) const {
   for (std::size_t i = first; i < faces.size(); ++i) {
     if (const std::vector<std::uint32_t>* const crossed = all_crossed(faces[i], others.size())) {
       const auto is_other = [&](std::uint32_t face) {
@@ -102,10 +103,7 @@ void InputCrossings::keep_crossing(std::vector<std::uint32_t>& faces) const {
 }
 
 bool InputCrossings::crosses_another(std::uint32_t face) const {
-  std::call_once(states_ready_, [&] {
-    state_ = std::vector<std::atomic<std::uint8_t>>(face_count());
-    asked_ = std::vector<std::atomic<std::uint32_t>>(face_count());
-  });
+  std::call_once(states_ready_, [&] { state_ = std::vector<std::atomic<std::uint8_t>>(face_count()); });
   std::uint8_t state = state_[face].load(std::memory_order_relaxed);
   if (state == unknown) {
     state = find_crossing(face) ? crossing : clear;
@@ -114,12 +112,12 @@ bool InputCrossings::crosses_another(std::uint32_t face) const {
   return state == crossing;
 }
 
-/// All faces for which crossed() holds with a face, in rising order, after it was asked about very many others, of
-/// which `others` are new. Null before, and where all such lists together would take too much memory.
-const std::vector<std::uint32_t>* InputCrossings::all_crossed(std::uint32_t face, std::size_t others) const {
-  const std::size_t many = std::max(kMany, face_count() / kManyShare);
-  if (asked_[face].load(std::memory_order_relaxed) < many) {
-    asked_[face].fetch_add(static_cast<std::uint32_t>(others), std::memory_order_relaxed);
+/// All faces for which crossed() holds with a face, in rising order. Null as long as few pairs with the face were asked
+/// about, to which this adds `asked_now`, and where the lists of all faces would take too much memory.
+const std::vector<std::uint32_t>* InputCrossings::all_crossed(std::uint32_t face, std::size_t asked_now) const {
+  std::call_once(counts_ready_, [&] { asked_ = std::vector<std::atomic<std::uint32_t>>(face_count()); });
+  if (asked_[face].load(std::memory_order_relaxed) < std::max(kManyAsked, face_count() / kManyAskedShare)) {
+    asked_[face].fetch_add(static_cast<std::uint32_t>(asked_now), std::memory_order_relaxed);
     return nullptr;
   }
   {
@@ -128,17 +126,21 @@ const std::vector<std::uint32_t>* InputCrossings::all_crossed(std::uint32_t face
     if (found != lists_.end()) return &found->second;
     if (in_lists_ > kMostInLists) return nullptr;
   }
+  poll();
   const Corners own = corners(face);
+  const Box box = box_of(own);
   std::vector<std::uint32_t> crossed;
   std::size_t turn = 0;
-  std::call_once(tree_ready_, [&] { build_tree(); });
-  near_.for_each_near(own, [&](std::uint32_t other) {
+  for_each_near(face, [&](std::uint32_t other) {
     poll_at(++turn);
-    if (other != face && faces_cross(own, corners(other)) && !are_of_one_sheet(face, other)) crossed.push_back(other);
+    const Corners its = corners(other);
+    const bool cross = other != face && meet(box, box_of(its)) && faces_cross(own, its);
+    if (cross && !are_of_one_sheet(face, other)) crossed.push_back(other);
     return true;
   });
   std::ranges::sort(crossed);
   crossed.erase(std::unique(crossed.begin(), crossed.end()), crossed.end());
+  crossed.shrink_to_fit();
   const std::unique_lock lock(lists_mutex_);
   const auto [place, is_new] = lists_.try_emplace(face, std::move(crossed));
   if (is_new) in_lists_ += place->second.size();
@@ -149,16 +151,20 @@ bool InputCrossings::find_crossing(std::uint32_t face) const {
   const Corners own = corners(face);
   const Box box = box_of(own);
   bool found = false;
-  const auto visit = [&](std::uint32_t other) {
+  for_each_near(face, [&](std::uint32_t other) {
     if (other == face) return true;
     const Corners its = corners(other);
     found = meet(box, box_of(its)) && faces_cross(own, its);
     return !found;
-  };
-  if (find_near_ && find_near_(face, visit)) return found;
-  std::call_once(tree_ready_, [&] { build_tree(); });
-  near_.for_each_near(own, visit);
+  });
   return found;
+}
+
+/// Calls visit(other) for the faces that a face may cross, and for others, until it returns false.
+void InputCrossings::for_each_near(std::uint32_t face, const std::function<bool(std::uint32_t)>& visit) const {
+  if (find_near_ && find_near_(face, visit)) return;
+  std::call_once(tree_ready_, [&] { build_tree(); });
+  near_.for_each_near(corners(face), visit);
 }
 
 void InputCrossings::build_tree() const {

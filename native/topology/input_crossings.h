@@ -42,12 +42,13 @@ class InputCrossings {
   bool are_of_one_sheet(std::uint32_t a, std::uint32_t b) const;
   /// Whether two faces crossed that are not of one double sheet.
   bool crossed(std::uint32_t a, std::uint32_t b) const;
-  /// Whether crossed() holds for one of the first and one of the second, which have none in common. Costs as
-  /// keep_crossing() does, and then about 5 ns a pair whose boxes do not meet. For a face that was asked about very
-  /// many others all that it crosses is found, and from then on only these cost time.
+  /// Whether crossed() holds for a face of `a` and a face of `b`. No face is in both. Costs as keep_crossing() does,
+  /// then O(k log k) for the k faces of `b`, and about 5 ns for each pair whose boxes do not meet. Once a face of `a`
+  /// was asked about with very many others, all that it crosses is found and kept. From then on each question about it
+  /// is a search in a sorted list.
   bool any_crossed(std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) const;
-  /// The places in `a`, in rising order, of the faces for which crossed() holds with one of `b`. They have none in
-  /// common, and all are faces that keep_crossing() keeps. Costs as any_crossed() does.
+  /// The places in `a`, in rising order, of the faces for which crossed() holds with a face of `b`. No face is in both,
+  /// and keep_crossing() keeps all of them. Costs as any_crossed() does.
   std::vector<std::uint32_t> which_crossed(std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) const;
   /// Takes away the faces that crossed no other. It takes about 3 us for each face that it is asked about for the first
   /// time, and 0.2 us for each face of the mesh if it has to build the tree.
@@ -62,23 +63,24 @@ class InputCrossings {
   };
 
   std::vector<Boxed> boxed(std::span<const std::uint32_t> faces) const;
-  std::size_t first_crossed(std::span<const std::uint32_t> faces, std::span<const Boxed> others,
-                            std::size_t first) const;
+  std::size_t first_crossed(std::span<const std::uint32_t> faces, std::span<const Boxed> others, std::size_t first,
+                            std::size_t& turn) const;
 
-  const std::vector<std::uint32_t>* all_crossed(std::uint32_t face, std::size_t others) const;
+  const std::vector<std::uint32_t>* all_crossed(std::uint32_t face, std::size_t asked_now) const;
   bool crosses_another(std::uint32_t face) const;
   bool find_crossing(std::uint32_t face) const;
+  void for_each_near(std::uint32_t face, const std::function<bool(std::uint32_t)>& visit) const;
   void build_tree() const;
   void find_sheets() const;
 
   MeshView input_;
   std::vector<Corners> fixed_;
   FindNear find_near_;
-  mutable std::once_flag sheets_known_, states_ready_, tree_ready_;
+  mutable std::once_flag sheets_known_, states_ready_, counts_ready_, tree_ready_;
   mutable std::vector<std::uint32_t> sheets_;             ///< per face, found when first needed
   mutable NearFaces near_;                                ///< all faces, made when first needed
   mutable std::vector<std::atomic<std::uint8_t>> state_;  ///< per face: a State, made when first needed
-  /// Per face: how many pairs with it were asked about before it has a list, made with state_.
+  /// Per face: how many pairs with it were asked about before it has a list, made when first needed.
   mutable std::vector<std::atomic<std::uint32_t>> asked_;
   mutable std::shared_mutex lists_mutex_;
   mutable std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> lists_;  ///< as all_crossed() returns them

@@ -168,8 +168,10 @@ bool NewCrossings::share_out(const NearFaces& near, std::span<const Face> faces,
                              Trial& trial) const {
   std::vector<std::uint32_t> of_met = origins_of(trial.met_last_, {});
   input_.keep_crossing(of_met);
-  if (of_met.empty()) return false;                     // as always in a mesh without crossings
-  std::vector<std::uint32_t> members, holders, owners;  // input faces, the faces that stand for them, places in `faces`
+  if (of_met.empty()) return false;    // as always in a mesh without crossings
+  std::vector<std::uint32_t> members;  // input faces
+  std::vector<std::uint32_t> holders;  // per member: the face that would stand for it
+  std::vector<std::uint32_t> owners;   // per member: the place of that face in `faces`, or kOutside
   const auto add_all = [&](std::uint32_t face, std::uint32_t of, std::uint32_t owner) {
     std::vector<std::uint32_t> crossing = origins_of(face, {});
     input_.keep_crossing(crossing);
@@ -181,7 +183,8 @@ bool NewCrossings::share_out(const NearFaces& near, std::span<const Face> faces,
     add_all(r.id, r.successor,
             at == faces.end() ? Succession::kOutside : static_cast<std::uint32_t>(at - faces.begin()));
   }
-  if (members.empty() || input_.which_crossed(members, of_met).empty()) return false;
+  if (members.empty() || members.size() * of_met.size() > kMostPairs) return false;
+  if (input_.which_crossed(members, of_met).empty()) return false;
 
   Succession succession(owners);
   const Ring ring{faces, trial.boxes_, trial.ring_, trial.hub_};

@@ -304,8 +304,8 @@ def test_polygons_are_said_to_be_cut(tmp_path):
 # Damage -----------------------------------------------------------------------------------------------------------------
 
 
-def text_of(face="3 0 1 2", of_face="property list uchar int vertex_indices"):
-    """Returns a PLY file of a triangle."""
+def ply_text(face="3 0 1 2", of_face="property list uchar int vertex_indices"):
+    """Returns a PLY file in text form that holds one triangle."""
     of_vertex = "".join(f"property float {axis}\n" for axis in "xyz")
     head = f"ply\nformat ascii 1.0\nelement vertex 3\n{of_vertex}element face 1\n{of_face}\nend_header\n"
     return f"{head}1 0 0\n1 1 0\n1 0 1\n{face}\n".encode()
@@ -354,10 +354,12 @@ def damaged(tmp_path):
     yield "index.off", whole[".off"].replace(b"\n3 0 ", b"\n3 7777 ", 1), "names vertex 7777"
     for name, wrong in (("size", b"\n3.5 0 "), ("corner", b"\n3 0.5 ")):
         yield f"{name}.off", whole[".off"].replace(b"\n3 0 ", wrong, 1), "is not a list of vertices (3"
-    for name, face in (("endless", "inf 0 1 2"), ("nan", "nan 0 1 2")):
-        yield f"{name} list.ply", text_of(face), "ends inside its list of face"
-    yield "scalar.ply", text_of("3", "property int vertex_indices"), "its faces name no vertices"
-    yield "lists.ply", text_of().replace(b"float x", b"list uchar float x"), "its vertices have no x, y, z"
+    for name, face in (("endless", "inf 0 1 2"), ("nan", "nan 0 1 2"), ("part", "3.5 0 1 2")):
+        yield f"{name} list.ply", ply_text(face), "ends inside its list of face"
+    for name, corner in (("inf", "inf"), ("half", "0.5"), ("large", "1e300")):
+        yield f"{name} corner.ply", ply_text(f"3 0 1 {corner}"), "by numbers that are not whole"
+    yield "scalar.ply", ply_text("3", "property int vertex_indices"), "its faces name no vertices"
+    yield "lists.ply", ply_text().replace(b"float x", b"list uchar float x"), "its vertices have no x, y, z"
     yield "nan.obj", whole[".obj"].replace(b"v ", b"v nan 0 0\nv ", 1), "vertex 1 is not finite"
     yield (
         "none.ply",

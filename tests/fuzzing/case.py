@@ -38,7 +38,10 @@ class Case:
         return float(np.linalg.norm(np.ptp(self.world(self.vertices[self.triangles.ravel()]), axis=0)))
 
     def longest_diagonal(self):
-        """Returns the longest diagonal, in the world, of the local bounding box of the used vertices: the largest tolerance."""
+        """Returns the longest diagonal, in the world, of the local bounding box of the used vertices.
+
+        A larger tolerance is refused. This is tolvol.diagonal, computed by other code.
+        """
         if not len(self.triangles):
             return 0.0
         used = self.vertices[self.triangles.ravel()]

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "base/parallel.h"
 #include "check/certificate.h"
 #include "check/tolerance_volume.h"
 #include "geometry/closest_point.h"

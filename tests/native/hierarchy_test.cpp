@@ -99,7 +99,7 @@ using Link = std::array<std::uint32_t, 3>;
 std::vector<Link> links(const Hierarchy& tree) {
   std::vector<Link> found;
   for (std::uint32_t node = 0; node < tree.node_count(); ++node) {
-    tree.for_each_below(
+    tree.for_each_child(
         node,
         [&](std::uint32_t triangle) {
           found.push_back({node, triangle, 0});

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <random>
 
+#include "base/parallel.h"
 #include "check/certificate.h"
 #include "motion/constrain.h"
 #include "motion/guard.h"

@@ -9,6 +9,7 @@
 #include <optional>
 #include <random>
 
+#include "base/parallel.h"
 #include "check/facing.h"
 #include "shapes.h"
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <numbers>
 
+#include "base/parallel.h"
 #include "patches.h"
 #include "polls.h"
 

@@ -84,6 +84,11 @@ def common_size(sizes):
     return int(sizes[0]) if len(sizes) and (sizes == sizes[0]).all() else sizes
 
 
+def are_whole(values):
+    """Tells which numbers are whole, and not too large for an integer."""
+    return (values == np.rint(values)) & (np.abs(values) < 2**53)
+
+
 def numbers(text, dtype):
     """Returns the numbers in a text, or None when the text holds anything else."""
     with warnings.catch_warnings():

@@ -2,11 +2,12 @@
 """Finds damage in a mesh file that Blender's readers do not report, and reads PLY, STL and OBJ files.
 
 Blender's readers turn coordinates that are not finite into zeros, drop faces that name a missing vertex, read a truncated
-STL file as an empty one, and skip a line of an OBJ file after a byte order mark. check() finds such damage in the file
+STL file as an empty one, and skip the first line of an OBJ file if a byte order mark stands before it. check() finds such damage in the file
 itself. It also counts the faces of the file, so that the faces that a reader drops (repeated faces and faces with a
 repeated corner) can be reported.
 """
 
+import codecs
 import re
 from pathlib import Path
 
@@ -40,6 +41,6 @@ def check(extension, data, folder):
         raise Refused("the file is empty")
     if extension in (".gltf", ".glb"):
         return Content(gltf_check.check(data, folder))
-    if extension == ".obj" and re.match(obj_file.MARK + rb"[ \t]*[vf]", data):
+    if extension == ".obj" and re.match(codecs.BOM_UTF8 + rb"[ \t]*[^\s#]", data):
         raise Refused("a byte order mark hides its first line from Blender: save it as UTF-8 without this mark")
     return {".obj": obj_file, ".ply": ply_file, ".stl": stl_file}[extension].read(data)

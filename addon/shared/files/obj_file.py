@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads and checks OBJ files."""
 
+import codecs
 import re
 from dataclasses import replace
 
@@ -9,12 +10,10 @@ import numpy as np
 from ..errors import Refused
 from .content import Content, common_size, numbers, positions, require_finite, require_indices
 
-MARK = b"\xef\xbb\xbf"  # Some editors begin a text with this byte order mark.
-
 
 def read(data, attributes=False):
     """Returns the Content of a file. attributes: whether to read UVs, normals, colours and the names of what is left out."""
-    data = data.removeprefix(MARK)
+    data = data.removeprefix(codecs.BOM_UTF8)  # Some editors begin a text with this byte order mark.
     if b"\0" in data:
         raise Refused("this is not an OBJ file: it holds binary data")
     text = re.sub(rb"#[^\r\n]*", b"", data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" "))

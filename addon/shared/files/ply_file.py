@@ -7,7 +7,7 @@ import struct
 import numpy as np
 
 from ..errors import Refused
-from .content import Content, numbers, require_finite, require_indices
+from .content import Content, are_whole, numbers, require_finite, require_indices
 
 # The name of a number type in PLY -> its name in NumPy, without byte order.
 _PLY_TYPES = {
@@ -44,7 +44,7 @@ def read(data):
     for name, count, properties in elements:
         try:
             rows, offset = _ply_element(body, offset, count, properties, order)
-        except (ValueError, OverflowError, struct.error):  # OverflowError: an endless list
+        except (ValueError, OverflowError, struct.error):  # int() raises OverflowError if a list has an infinite length.
             raise Refused(f"the file ends inside its list of {name} elements") from None
         if name == "vertex":
             if not all(_is_column(rows.get(axis)) for axis in "xyz"):
@@ -99,7 +99,7 @@ def _corners(indices):
         )
     corners, sizes = indices if isinstance(indices, tuple) else (indices.ravel(), indices.shape[1])
     if corners.dtype.kind == "f":  # from a text
-        if (corners != np.rint(corners)).any():
+        if not are_whole(corners).all():
             raise Refused("its faces name vertices by numbers that are not whole")
         corners = corners.astype(np.int64)
     return np.ascontiguousarray(corners, corners.dtype.newbyteorder("=")), sizes
@@ -196,7 +196,10 @@ def _ply_ragged(body, offset, count, properties, order):
         for values, lengths, counted, kind, size in readers:
             length = 1
             if counted:
-                length = int(counted.unpack_from(body, offset)[0])
+                declared = counted.unpack_from(body, offset)[0]
+                length = int(declared)
+                if length != declared:
+                    raise ValueError
                 offset += counted.size
                 lengths.append(length)
             values += struct.unpack_from(f"{order}{length}{kind}", body, offset)

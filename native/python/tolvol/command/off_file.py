@@ -6,7 +6,7 @@ import re
 import numpy as np
 
 from ..shared.errors import Refused
-from ..shared.files.content import Content, common_size, numbers, positions, require_finite
+from ..shared.files.content import Content, are_whole, common_size, numbers, positions, require_finite
 
 
 def read(data):
@@ -48,11 +48,11 @@ def _faces(lines):
             if (one := numbers(line, np.float64)) is not None and len(one) == width:
                 words[begin : begin + width] = one
     first = words[begins]
-    is_bad = (first < 0) | (widths <= first) | (first != np.rint(first))
+    is_bad = (first < 0) | (widths <= first) | ~are_whole(first)
     within, sizes = np.arange(len(words)) - np.repeat(begins, widths), np.where(is_bad, 0, first).astype(np.int64)
     is_corner = (within > 0) & (within <= np.repeat(sizes, widths))
-    fractions = np.flatnonzero(is_corner & (words != np.rint(words)))
-    is_bad[np.searchsorted(begins, fractions, "right") - 1] = True
+    not_whole = np.flatnonzero(is_corner & ~are_whole(words))
+    is_bad[np.searchsorted(begins, not_whole, "right") - 1] = True
     bad = np.flatnonzero(is_bad)
     if len(bad):
         line = lines[bad[0]].decode(errors="replace").strip()
