@@ -175,6 +175,35 @@ TEST(CertifiedFacing, ATriangleWithAPointOutsideHasNoProof) {
   EXPECT_GT(shown, 0.6 * unproved) << "the others have a corner outside, which is not looked at";
 }
 
+// The mesh has so many triangles that several threads take some of them and of the nodes, and some without a normal.
+TEST(Facing, ThreadsFindTheSameNormalsAndBounds) {
+  TriangleMesh mesh = shapes::torus(200, 0.1);
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += 11) {
+    mesh.vertices.push_back(mesh.vertices[mesh.triangles[t].x] + dvec3(1e-13));
+    mesh.triangles[t].y = std::uint32_t(mesh.vertices.size() - 1);
+  }
+  const Hierarchy hierarchy(mesh);
+  Team one(1), three(3);
+  FacingRule alone(mesh, kError, kError, kRight, one), shared(mesh, kError, kError, kRight, three);
+  alone.bound_normals(hierarchy, one), shared.bound_normals(hierarchy, three);
+  EXPECT_GT(alone.unsure, 1'000u);
+  EXPECT_EQ(shared.unsure, alone.unsure);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const bool has_normal = !std::isnan(alone.normals[t].x);
+    ASSERT_TRUE(has_normal ? shared.normals[t] == alone.normals[t] : std::isnan(shared.normals[t].x));
+  }
+  shapes::Random random(3);
+  std::size_t admitted = 0;
+  for (std::uint32_t node = 0; node < hierarchy.node_count(); ++node) {
+    const dvec3 normal = glm::normalize(random.point());
+    const bool may = alone.may_face(node, normal, 0.9);
+    ASSERT_EQ(shared.may_face(node, normal, 0.9), may);
+    admitted += may;
+  }
+  EXPECT_GT(admitted, hierarchy.node_count() / 100);
+  EXPECT_LT(admitted, hierarchy.node_count() / 2);
+}
+
 TEST(Facing, FindsTheNearestThatIsAdmitted) {
   shapes::Random random(5);
   const TriangleMesh mesh = shapes::torus(24, 0.1);

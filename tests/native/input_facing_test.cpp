@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "candidates.h"
 #include "decimation/decimation_input.h"
@@ -18,6 +19,27 @@ using glm::dvec3;
 /// Moves points along z so that a plate turns about the y axis through a point.
 dvec3 turned(const dvec3& p, double about, double degrees) {
   return p + dvec3(0, 0, (p.x - about) * std::tan(glm::radians(degrees)));
+}
+
+// Where the cut turns triangles, nodes of the hierarchy below which all are turned have to be found by the new normals.
+TEST(InputFacing, ASearchFindsTrianglesThatTheCutHasTurned) {
+  TriangleMesh plate = shapes::grid(40);
+  for (glm::uvec3& t : plate.triangles) {
+    if (plate.vertices[t.x].x < 0.5) std::swap(t.y, t.z);
+  }
+  Team team(1);
+  const CutMesh cut = cut_to_manifold(plate.vertices, plate.triangles, team);
+  ASSERT_GT(cut.reversed_count, 0u);
+  const Hierarchy hierarchy(plate);
+  FacingRule rule(plate, 0, 0, std::numbers::pi / 2, team);
+  rule.bound_normals(hierarchy, team);
+  // One half is turned so that it faces as the other.
+  const bool is_first = cut.reversed[0];
+  const dvec3 above_turned(is_first ? 0.1 : 0.9, 0.4, 0.05);
+  const dvec3 normal = is_first ? rule.normals.back() : rule.normals.front();
+  EXPECT_GT(rule.nearest(hierarchy, above_turned, normal, kSameSide, 1).distance, 0.3);
+  face_as_cut(cut, hierarchy, team, rule);
+  EXPECT_NEAR(rule.nearest(hierarchy, above_turned, normal, kSameSide, 1).distance, 0.05, 1e-9);
 }
 
 TEST(InputFacing, AFaceKeepsTheLeastAngleThatIsProved) {

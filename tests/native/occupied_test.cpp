@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "certified_mesh.h"
 #include "check/certificate.h"
 #include "decimation/certified_bounds.h"
 #include "decimation/change_trial.h"
@@ -96,6 +97,32 @@ TEST(Occupied, NoVertexIsPutWhereAnotherIs) {
   mesh.keep_apart(regions, alone);
   EXPECT_EQ(to(taken), std::pair(ChangeTrial::Outcome::possible, false)) << "in regions, the place is free";
   EXPECT_EQ(to(mesh.vertex_position(above)), std::pair(ChangeTrial::Outcome::refused, true)) << "in regions";
+}
+
+// Vertices at the rim of a region belong to none, and are in the cells of several.
+TEST(BoundedMesh, ARegionKnowsThePlacesOfAllVerticesInItsCell) {
+  const TriangleMesh plate = shapes::grid(40);
+  CertifiedMesh c(plate, plate.vertices, 0.1);
+  Team three(3);
+  const Regions regions(*c.mesh, 300, 0.4, three);
+  ASSERT_GE(regions.count(), 4u);
+  c.mesh->keep_apart(regions, three);
+  std::vector<std::uint32_t> members(regions.count(), Regions::kNone);  // of each region a vertex
+  for (std::uint32_t v = 0; v < plate.vertices.size(); ++v) {
+    if (regions.of_vertex(v) != Regions::kNone) members[regions.of_vertex(v)] = v;
+  }
+  int at_rim = 0;
+  for (std::uint32_t v = 0; v < plate.vertices.size(); ++v) {
+    at_rim += regions.of_vertex(v) == Regions::kNone;
+    Box place;
+    place.add(c.mesh->stored(v));
+    regions.for_each_meeting(place, [&](std::uint32_t region) {
+      const std::uint32_t u = members[region];
+      ASSERT_NE(u, Regions::kNone);
+      EXPECT_EQ(c.mesh->meets_another(c.mesh->vertex_position(v), u, u), v != u);
+    });
+  }
+  EXPECT_GT(at_rim, 40);
 }
 
 }  // namespace

@@ -24,6 +24,12 @@ THREADED = {
     "*.SharesOfTheToleranceAreKeptAroundTheirVertices:*.EdgesBetweenLockedVerticesStay:*.LockedVerticesStay:"
     "*.CornersOfAFaceKeepToOneSideOfASeam:*.TimeAndTargetEndIt",
     "Guard": "Guard.*",
+    "Hierarchy": "Hierarchy.ThreadsMakeTheSameTree:Hierarchy.ManyThreadsGetTheSameAnswers",
+    "MortonOrder": "MortonOrder.SortsByCodeAndKeepsTheOrderOfEqualOnes",
+    "Weld": "Weld.ThreadsFindTheSame",
+    "InputCrossings": "InputCrossings.ThreadsGetTheAnswersOfOne",
+    "Facing": "Facing.ThreadsFindTheSameNormalsAndBounds",
+    "EdgeCollapse": "EdgeCollapse.QuadricsAreTheSameOnThreads",
 }
 
 
