@@ -2,9 +2,9 @@
 """Finds damage in a mesh file that Blender's readers do not report, and reads PLY, STL and OBJ files.
 
 Blender's readers turn coordinates that are not finite into zeros, drop faces that name a missing vertex, read a truncated
-STL file as an empty one, and skip the first line of an OBJ file if a byte order mark stands before it. check() finds such damage in the file
-itself. It also counts the faces of the file, so that the faces that a reader drops (repeated faces and faces with a
-repeated corner) can be reported.
+STL file as an empty one, and skip the first line of an OBJ file if a byte order mark stands before it. check() finds such
+damage in the file itself. It also counts the faces of the file, so that the faces that a reader drops (repeated faces and
+faces with a repeated corner) can be reported.
 """
 
 import codecs
