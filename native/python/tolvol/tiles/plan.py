@@ -13,7 +13,7 @@ from .cells import Box, Cells, centroids, lowest_and_highest
 # OF_FIRST: for each triangle in the first round, where the mesh is the reference. OF_FIRST_IF_SHORT: in place of OF_FIRST where
 # the tolerance is short, because more triangles of the reference are cut into pieces then. OF_REFERENCE, OF_MESH: for each
 # triangle of these in later rounds.
-FIXED, OF_FIRST, OF_FIRST_IF_SHORT, OF_REFERENCE, OF_MESH = 160 << 20, 750, 1500, 330, 1840
+FIXED, OF_FIRST, OF_FIRST_IF_SHORT, OF_REFERENCE, OF_MESH = 160 << 20, 750, 1500, 345, 1840
 _SHORT = 1 / 4  # A tolerance below this share of the median edge is short.
 OF_GRID = 1 / 4  # The grid of distances may take this share of the memory beside FIXED.
 _OF_NODE = 10  # bytes of a node of the grid: 8, and more where rows are filled up
