@@ -105,6 +105,15 @@ void FacingRule::bound_normals(const Hierarchy& hierarchy, Team& team) {
   }
 }
 
+void FacingRule::turn(const std::vector<bool>& reversed, const Hierarchy& hierarchy, Team& team) {
+  bool any = false;
+  for (std::size_t t = 0; t < reversed.size(); ++t) {
+    poll_at(t);
+    if (reversed[t]) normals[t] = -normals[t], any = true;
+  }
+  if (any) bound_normals(hierarchy, team);
+}
+
 Hierarchy::Nearest FacingRule::nearest(const Hierarchy& hierarchy, const glm::dvec3& p, const glm::dvec3& normal,
                                        double least, double radius, std::uint32_t hint, const Enough& enough) const {
   const auto accept = [&](std::uint32_t triangle) { return glm::dot(normals[triangle], normal) >= least; };

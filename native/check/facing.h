@@ -43,9 +43,11 @@ struct FacingRule {
   FacingRule(const TriangleMesh& reference, double reference_error, double mesh_error, double angle, Team& team);
 
   /// Bounds the normals below each node of the reference's hierarchy, so that nearest() leaves out nodes in which no
-  /// triangle faces as it should. It has to be called again once a normal was turned; a normal that becomes NaN only
-  /// leaves the bounds wider than they need be. O(m), shared by the threads of the team.
+  /// triangle faces as it should. A normal that becomes NaN later only leaves the bounds wider than they need be. O(m),
+  /// shared by the threads of the team.
   void bound_normals(const Hierarchy& hierarchy, Team& team);
+  /// Turns the normals of these triangles, and bounds the normals anew if there are any. O(m).
+  void turn(const std::vector<bool>& reversed, const Hierarchy& hierarchy, Team& team);
 
   /// Tells of a triangle whether a search may end with it.
   using Enough = std::function<bool(std::uint32_t triangle)>;

@@ -85,7 +85,7 @@ struct DecimationResult {
 /// Without a volume there is no tolerance at all, and a target is needed: this is the loop that the bounded one is
 /// compared with. Throws InvalidInput for a bad mesh, for input that is outside its reference (unless Outside::keep),
 /// and where the stored type cannot hold the tolerance; Cancelled. On one thread Effort::fast takes 7 to 9 us a
-/// triangle at a tolerance of 1 % and 29 to 48 us at 0.1 %, with the grid of the volume and crossings kept out.
+/// triangle at a tolerance of 1 % and 30 to 53 us at 0.1 %, with the grid of the volume and crossings kept out.
 /// Effort::thorough then collapses more edges, and moves the vertices around each together: a third fewer triangles in
 /// 5 to 25 times the processor time. A mesh of some hundred triangles may take 75 times as long, and 20 seconds.
 DecimationResult decimate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,

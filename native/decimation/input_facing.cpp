@@ -31,20 +31,18 @@ std::vector<std::uint32_t> connected_parts(const CutMesh& cut) {
 }  // namespace
 
 void face_as_cut(const CutMesh& cut, const Hierarchy& hierarchy, Team& team, FacingRule& rule) {
-  std::vector<bool> is_in_cut(rule.normals.size(), false);
-  bool any = false;  // whether a normal is turned
+  std::vector<bool> is_in_cut(rule.normals.size(), false), reversed(rule.normals.size(), false);
   for (std::uint32_t t = 0; t < cut.triangles.size(); ++t) {
     poll_at(t);
     const std::uint32_t input = cut.triangle_input[t];
     if (input >= is_in_cut.size()) continue;  // it is no triangle of the reference
-    is_in_cut[input] = true;
-    if (cut.reversed[t]) rule.normals[input] = -rule.normals[input], any = true;
+    is_in_cut[input] = true, reversed[input] = cut.reversed[t];
   }
   for (std::size_t i = 0; i < is_in_cut.size(); ++i) {
     poll_at(i);
     if (!is_in_cut[i]) rule.normals[i] = glm::dvec3(std::numeric_limits<double>::quiet_NaN());
   }
-  if (any) rule.bound_normals(hierarchy, team);
+  rule.turn(reversed, hierarchy, team);
 }
 
 InputFacing face_as_reference(const CutMesh& cut, std::span<const glm::dvec3> positions,

@@ -30,11 +30,7 @@ MovingFacing::MovingFacing(FacingRule rule, std::size_t faces, int corners)
       is_renewed_(faces, 0) {}
 
 void MovingFacing::reverse_reference(const std::vector<bool>& reversed, const Hierarchy& hierarchy, Team& team) {
-  bool any = false;
-  for (std::size_t t = 0; t < reversed.size(); ++t) {
-    if (reversed[t]) rule_.normals[t] = -rule_.normals[t], any = true;
-  }
-  if (any) rule_.bound_normals(hierarchy, team);
+  rule_.turn(reversed, hierarchy, team);
 }
 
 /// How far all corners may go before the triangle turns by `angle`.

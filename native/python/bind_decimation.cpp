@@ -294,7 +294,7 @@ Cancelled
 
 Notes
 -----
-Cost of "fast" on one thread: 7 to 9 us a triangle at a tolerance of 1 % and 29 to 48 us at 0.1 %, with the grid of the
+Cost of "fast" on one thread: 7 to 9 us a triangle at a tolerance of 1 % and 30 to 53 us at 0.1 %, with the grid of the
 volume and crossings kept out.
 
 The order of the collapses is that of M. Garland, P. Heckbert, Surface Simplification Using Quadric Error Metrics, 1997.)doc");

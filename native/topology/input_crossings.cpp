@@ -106,7 +106,11 @@ bool InputCrossings::crosses_another(std::uint32_t face) const {
   std::call_once(states_ready_, [&] { state_ = std::vector<std::atomic<std::uint8_t>>(face_count()); });
   std::uint8_t state = state_[face].load(std::memory_order_relaxed);
   if (state == unknown) {
-    state = find_crossing(face) ? crossing : clear;
+    state = clear;
+    for_each_crossing(face, [&](std::uint32_t) {
+      state = crossing;
+      return false;
+    });
     state_[face].store(state, std::memory_order_relaxed);
   }
   return state == crossing;
@@ -127,15 +131,9 @@ const std::vector<std::uint32_t>* InputCrossings::all_crossed(std::uint32_t face
     if (in_lists_ > kMostInLists) return nullptr;
   }
   poll();
-  const Corners own = corners(face);
-  const Box box = box_of(own);
   std::vector<std::uint32_t> crossed;
-  std::size_t turn = 0;
-  for_each_near(face, [&](std::uint32_t other) {
-    poll_at(++turn);
-    const Corners its = corners(other);
-    const bool cross = other != face && meet(box, box_of(its)) && faces_cross(own, its);
-    if (cross && !are_of_one_sheet(face, other)) crossed.push_back(other);
+  for_each_crossing(face, [&](std::uint32_t other) {
+    if (!are_of_one_sheet(face, other)) crossed.push_back(other);
     return true;
   });
   std::ranges::sort(crossed);
@@ -147,24 +145,20 @@ const std::vector<std::uint32_t>* InputCrossings::all_crossed(std::uint32_t face
   return &place->second;
 }
 
-bool InputCrossings::find_crossing(std::uint32_t face) const {
+/// Calls visit(other) for the faces that cross a face, until it returns false. One may come more than once.
+void InputCrossings::for_each_crossing(std::uint32_t face, const std::function<bool(std::uint32_t)>& visit) const {
   const Corners own = corners(face);
   const Box box = box_of(own);
-  bool found = false;
-  for_each_near(face, [&](std::uint32_t other) {
+  std::size_t turn = 0;
+  const auto next = [&](std::uint32_t other) {
+    poll_at(++turn);
     if (other == face) return true;
     const Corners its = corners(other);
-    found = meet(box, box_of(its)) && faces_cross(own, its);
-    return !found;
-  });
-  return found;
-}
-
-/// Calls visit(other) for the faces that a face may cross, and for others, until it returns false.
-void InputCrossings::for_each_near(std::uint32_t face, const std::function<bool(std::uint32_t)>& visit) const {
-  if (find_near_ && find_near_(face, visit)) return;
+    return !meet(box, box_of(its)) || !faces_cross(own, its) || visit(other);
+  };
+  if (find_near_ && find_near_(face, next)) return;
   std::call_once(tree_ready_, [&] { build_tree(); });
-  near_.for_each_near(corners(face), visit);
+  near_.for_each_near(own, next);
 }
 
 void InputCrossings::build_tree() const {

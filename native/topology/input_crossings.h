@@ -68,8 +68,7 @@ class InputCrossings {
 
   const std::vector<std::uint32_t>* all_crossed(std::uint32_t face, std::size_t asked_now) const;
   bool crosses_another(std::uint32_t face) const;
-  bool find_crossing(std::uint32_t face) const;
-  void for_each_near(std::uint32_t face, const std::function<bool(std::uint32_t)>& visit) const;
+  void for_each_crossing(std::uint32_t face, const std::function<bool(std::uint32_t)>& visit) const;
   void build_tree() const;
   void find_sheets() const;
 

@@ -44,11 +44,8 @@ def read(data):
     for name, count, properties in elements:
         try:
             rows, offset = _ply_element(body, offset, count, properties, order)
-        except (
-            ValueError,
-            OverflowError,
-            struct.error,
-        ):  # int() raises OverflowError if a list has an infinite length.
+        # int() raises OverflowError if a list has an infinite length.
+        except (ValueError, OverflowError, struct.error):
             raise Refused(f"the file ends inside its list of {name} elements") from None
         if name == "vertex":
             if not all(_is_column(rows.get(axis)) for axis in "xyz"):
