@@ -21,8 +21,8 @@ namespace {
 constexpr std::size_t kTrianglesPerAttempt = 12, kMostAttempts = 64;
 /// Tries are rationed at a vertex with more faces around it than this.
 constexpr std::uint32_t kCrowded = 24;
-/// The tries at such a vertex may look at this many faces and parts of the reference's pieces together.
-constexpr std::uint64_t kCrowdBudget = 1 << 15;
+/// The tries at such a vertex may look at this many faces, parts of the reference's pieces and points of fits together.
+constexpr std::uint64_t kCrowdBudget = 1 << 14;
 /// Costs are renewed late at a vertex with more faces around it than this.
 constexpr std::uint32_t kGreatMany = 512;
 
@@ -173,8 +173,8 @@ void CollapseLoop::try_now(std::uint32_t edge, Tried& tried) {
   std::unique_ptr<Attempt> attempt = take_attempt();
   attempt->at_any_cost = at_any_cost_;
   collapse_.attempt(edge, *attempt);
-  tried = {attempt->outcome, attempt->trial.looked_at(), attempt->spared, attempt->trial.met_another(),
-           attempt->trial.read()};
+  tried = {attempt->outcome, attempt->trial.looked_at() + attempt->fit.looked_at(), attempt->spared,
+           attempt->trial.met_another(), attempt->trial.read()};
   if (tried.outcome == EdgeCollapse::Outcome::possible) {
     tried.attempt = std::move(attempt);
   } else {

@@ -59,7 +59,7 @@ class CollapseLoop {
   /// The outcome of trying an edge.
   struct Tried {
     EdgeCollapse::Outcome outcome = EdgeCollapse::Outcome::impossible;
-    std::size_t looked_at = 0;           ///< The number of parts of the reference's pieces that were looked at.
+    std::size_t looked_at = 0;           ///< The parts of the reference's pieces, and points of fits, that it took.
     bool spared = false;                 ///< Whether positions that cost something were not asked for.
     bool met_another = false;            ///< Whether a vertex was in the way that may have gone since.
     Box read{};                          ///< What was found of crossings depends on the faces in this box.

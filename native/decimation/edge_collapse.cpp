@@ -125,7 +125,7 @@ double EdgeCollapse::cost(std::uint32_t edge) const {
 
 void EdgeCollapse::attempt(std::uint32_t edge, Attempt& a) const {
   a.outcome = Outcome::impossible, a.spared = false;
-  a.trial.begin();
+  a.trial.begin(), a.fit.begin();
   const std::optional<Plan> p = plan(BoundedMesh::edge(edge));
   if (!p) return;
   a.halfedge = p->halfedge;

@@ -24,8 +24,10 @@ class PositionFit {
   void gather(const Change& change);
 
   struct Fit {
-    double energy;        ///< The sum of areas, weighted by a high power of deviation over tolerance.
-    double deviation;     ///< The largest deviation that was seen, over the tolerance. Both are of the given position.
+    double energy;  ///< The sum of areas, weighted by a high power of deviation over tolerance.
+    /// The largest deviation that was seen, over the tolerance; from a face over the root of the face's share, too.
+    /// Both are of the given position.
+    double deviation;
     glm::dvec3 position;  ///< A position that lowers the energy, to first order.
   };
   /// The fit of the faces as the change would leave them, with its vertex at `position`. About 10 ns for each face and
@@ -36,16 +38,22 @@ class PositionFit {
   ChangeTrial::Outcome collapse(ChangeTrial& trial, Change::Halfedge h, const glm::dvec3& start,
                                 std::span<const double> give_up_above);
 
+  /// Starts to count anew.
+  void begin() { looked_at_ = 0; }
+  /// The number of points for which the nearest point was looked for since begin().
+  std::size_t looked_at() const { return looked_at_; }
+
  private:
   struct Sums;
   void prepare(const Change& change);
-  void add_pieces(const Change& change, double most, Sums& sums) const;
-  void add_faces(const Change& change, double most, Sums& sums) const;
+  void add_pieces(const Change& change, double most, Sums& sums);
+  void add_faces(const Change& change, double most, Sums& sums);
 
   const BoundedMesh* mesh_;
   const CertifiedBounds* bounds_;
   std::vector<Coverage::Sample> samples_;
   std::vector<WitnessTriangle> faces_;
+  std::size_t looked_at_ = 0;
 };
 
 }  // namespace tolvol

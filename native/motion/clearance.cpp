@@ -146,7 +146,7 @@ void Clearance::limit_by_gaps(std::span<const std::uint32_t> faces, const Moving
       const Corners triangle = corners(face);
       const double own_reach = reach(face);
       std::size_t looked_at = 0;
-      near.for_each_near(face, in_room(), [&](std::uint32_t other) {
+      near.for_each_near_elsewhere(face, in_room(), [&](std::uint32_t other) {
         if (++looked_at % 64 == 0) poll();
         if (other < face && renewed_[other] == now_) return true;  // it looks at this one
         const auto c = mesh_.corners_of(other);

@@ -57,8 +57,13 @@ class MovingFaces {
   /// for some that share a hub with it and do not cross it. A visit that returns false ends the search.
   template <class At, class Visit>
   void for_each_near(std::uint32_t face, At&& at, Visit&& visit) const {
-    const auto none = [](const glm::dvec3&) { return [](const Box&) { return false; }; };
-    search(none, face, at, visit);
+    search(Shared::looked_at, none_apart, face, at, visit);
+  }
+  /// The same without the faces that are kept around a hub of this one. They share the hub with it if no face has come
+  /// to have other corners.
+  template <class At, class Visit>
+  void for_each_near_elsewhere(std::uint32_t face, At&& at, Visit&& visit) const {
+    search(Shared::left_out, none_apart, face, at, visit);
   }
   /// The same for a triangle with these corners, where `at` has all hubs at points. Those around a hub that are apart
   /// from it as seen from there are left out, too; so may be the face itself.
@@ -67,12 +72,17 @@ class MovingFaces {
     const auto apart_from = [&](const glm::dvec3& hub) {
       return [fan = ApartFromFan(corners, hub)](const Box& rims) { return fan.surely(rims); };
     };
-    search(apart_from, face, at, visit);
+    search(Shared::looked_at, apart_from, face, at, visit);
   }
 
  private:
+  /// What becomes of the faces around a hub of the face itself.
+  enum class Shared { looked_at, left_out };
   template <class Apart, class At, class Visit>
-  void search(Apart&& apart_from, std::uint32_t face, At&& at, Visit&& visit) const;
+  void search(Shared shared, Apart&& apart_from, std::uint32_t face, At&& at, Visit&& visit) const;
+  static auto none_apart(const glm::dvec3&) {
+    return [](const Box&) { return false; };
+  }
 
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
@@ -130,7 +140,7 @@ void MovingFaces::change(std::span<const std::uint32_t> faces, At&& at) {
 
 /// `apart_from(hub)` tells of the box of faces' corners beside the hub whether they are surely apart from the face.
 template <class Apart, class At, class Visit>
-void MovingFaces::search(Apart&& apart_from, std::uint32_t face, At&& at, Visit&& visit) const {
+void MovingFaces::search(Shared shared, Apart&& apart_from, std::uint32_t face, At&& at, Visit&& visit) const {
   const Box own = box(face, at);
   bool more = true;
   const auto next = [&](std::uint32_t other) { return more = visit(other); };
@@ -144,6 +154,7 @@ void MovingFaces::search(Apart&& apart_from, std::uint32_t face, At&& at, Visit&
     };
     if (!meet(whole(group.tree.box()), own)) continue;
     const bool shares = std::ranges::find(corners_of(face), group.hub) != corners_of(face).end();
+    if (shares && shared == Shared::left_out) continue;
     const Box opposite = shares ? rim(face, group.hub, at) : own;
     const auto apart = apart_from(hub.lower);
     group.tree.for_each_where(

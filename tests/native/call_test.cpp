@@ -113,7 +113,8 @@ TEST(Call, StopsEveryOperationInItsMiddle) {
     SCOPED_TRACE(named.name);
     const std::size_t polls = polls_of(named.run);
     ASSERT_GE(polls, 8u);
-    for (const double share : {0.02, 0.5, 0.97}) {
+    for (const double share : {0.5, 0.02, 0.97}) {
+      if (kSanitized && share != 0.5) break;  // the ordinary build cancels early and late, too
       const Counted part(1 + static_cast<std::size_t>(share * static_cast<double>(polls)));
       EXPECT_THROW(named.run(), Cancelled) << share;
       EXPECT_EQ(part.polls, part.last) << share;

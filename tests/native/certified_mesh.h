@@ -18,7 +18,7 @@ struct CertifiedMesh {
   /// The mesh has the reference's triangles and these positions, which are within the tolerance. The reference must be
   /// a manifold, sheets of which may touch.
   CertifiedMesh(const TriangleMesh& surface, const std::vector<glm::dvec3>& vertices, double tolerance,
-                std::vector<bool> pinned = {})
+                std::vector<bool> pinned = {}, std::vector<double> shares = {})
       : reference(surface) {
     volume.emplace(reference.vertices, reference.triangles, StoredSpace(glm::dmat4(1), Storage::float64), tolerance,
                    ToleranceVolume::Options{.precision = 8});
@@ -37,6 +37,7 @@ struct CertifiedMesh {
     }
     input.slots = weld_equal_positions(reference.vertices);
     input.pinned = pinned.empty() ? std::vector<bool>(vertices.size(), false) : std::move(pinned);
+    input.shares = std::move(shares);
     input.store = [this](const glm::dvec3& p) {
       const glm::dvec3 stored = space->store(p);
       return VertexPosition{stored, space->frame(stored)};

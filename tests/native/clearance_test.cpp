@@ -4,8 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
 #include <numeric>
 
+#include "polls.h"
 #include "shapes.h"
 #include "topology/crossings.h"
 
@@ -142,6 +145,20 @@ TEST(Clearance, WhereFacesCrossOrTurnOverThereIsNoRoom) {
   plate.renew();
   EXPECT_EQ(plate.room(24, {0, 0, 1}), 0);
   EXPECT_GT(plate.room(0, {0, 0, 1}), 0);
+}
+
+// The boxes of faces at a hub all meet, but none of these faces is another one's neighbour across a gap.
+TEST(Clearance, AroundAHubAFaceIsComparedWithFew) {
+  constexpr std::uint32_t kCount = 4000;
+  TriangleMesh fan{{dvec3(0)}, {}};
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kCount, y = std::sin(angle);
+    fan.vertices.emplace_back(std::cos(angle), 0.8 * y, 0.6 * y);
+    fan.triangles.emplace_back(0, 1 + i, 1 + (i + 1) % kCount);
+  }
+  Scene scene(fan);
+  // A face polls once for each 64 that it comes past.
+  EXPECT_LT(polls_of([&] { scene.renew(); }), kCount);
 }
 
 TEST(Clearance, BoxesHoldFacesInTheirRooms) {

@@ -150,6 +150,7 @@ TEST(DecimationCrossings, AnyMatrixAndStorage) {
   far_away[3] = {5000, -3000, 100, 1};
   for (const glm::dmat4& to_world : {sheared, mirrored, far_away}) {
     for (const Storage storage : {Storage::float32, Storage::float64}) {
+      if (kSanitized && (storage == Storage::float32) == (to_world == mirrored)) continue;  // one for each matrix
       const Case c{hollow(6, 0.01), to_world, storage, 2};
       const DecimationResult r = run(c);
       EXPECT_TRUE(crossings_by_cgal({r.vertices, r.triangles}).empty());
@@ -191,12 +192,13 @@ TEST(DecimationCrossings, TheirNumberNeverRises) {
         shapes::torus(24),
         moved(shapes::torus(20), glm::dmat4({0.9, 0.1, 0, 0}, {0, 1, 0.2, 0}, {0.1, 0, 1, 0}, {0.01, 0.02, 0, 1})));
     for (dvec3& p : rough.vertices) p += 0.004 * (seed + 1) * random.point();
-    const Case c{shapes::stored(rough)};
+    Case c{shapes::stored(rough)};
     const std::size_t of_input = count(c.mesh.vertices, c.mesh.triangles);
     for (const auto effort : {Options::Effort::fast, Options::Effort::thorough}) {
       if (effort == Options::Effort::thorough && (seed > 0 || kSanitized) && !is_full_run()) continue;
       Options options;
       options.effort = effort;
+      c.percent = effort == Options::Effort::thorough ? 2 : 1;  // Thorough takes the time of what is left.
       const DecimationResult r = run(c, options);
       const std::size_t of_result = count(r.vertices, r.triangles);
       EXPECT_LE(of_result, of_input) << "seed " << seed;

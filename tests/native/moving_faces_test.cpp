@@ -158,6 +158,23 @@ TEST(MovingFaces, AreFewAtAHub) {
   }
 }
 
+TEST(MovingFaces, ElsewhereAreAllWithoutTheHub) {
+  const Fan fan(4000);
+  std::size_t looked_at = 0;
+  for (const std::uint32_t f : fan.all) {
+    std::set<std::uint32_t> elsewhere;
+    fan.near.for_each_near_elsewhere(f, fan.at(), [&](std::uint32_t other) { return elsewhere.insert(other).second; });
+    looked_at += elsewhere.size();
+    const auto has_hub = [&](std::uint32_t face) {
+      return std::ranges::count(&fan.faces[3 * face], &fan.faces[3 * face + 3], 0u) > 0;
+    };
+    for (const std::uint32_t other : fan.found(f, false)) {
+      EXPECT_EQ(elsewhere.contains(other), !(has_hub(f) && has_hub(other))) << f << " and " << other;
+    }
+  }
+  EXPECT_LT(looked_at, fan.all.size());
+}
+
 TEST(MovingFaces, ASearchEndsWhenAVisitSaysSo) {
   const Fan fan(NearFaces::kHub);
   for (const std::uint32_t f : fan.all) {

@@ -13,13 +13,13 @@ using glm::dvec3;
 constexpr unsigned kSide = 8;
 constexpr std::uint32_t kLifted = (kSide / 2) * (kSide + 1) + kSide / 2;
 
-/// A flat plate, and the mesh with one vertex lifted.
-CertifiedMesh plate_lifted_by(double height) {
+/// A flat plate, and the mesh with one vertex lifted. All faces may use the same share of the tolerance.
+CertifiedMesh plate_lifted_by(double height, double share = 1) {
   TriangleMesh reference = shapes::grid(kSide);
   for (dvec3& p : reference.vertices) p.z = 0;
   std::vector<dvec3> vertices = reference.vertices;
   vertices[kLifted].z = height;
-  return {reference, vertices, 0.2};
+  return {reference, vertices, 0.2, {}, std::vector<double>(vertices.size(), share)};
 }
 
 TEST(PositionFit, BringsALiftedVertexBackToThePlane) {
@@ -42,6 +42,39 @@ TEST(PositionFit, BringsALiftedVertexBackToThePlane) {
 
   ASSERT_TRUE(change.prepare_relocate(kLifted, {first.position, first.position}));
   EXPECT_LT(fit.fit(change, first.position).energy, 1e-3 * first.energy);
+}
+
+TEST(PositionFit, ADeviationOfAFaceCountsByTheRootOfItsShare) {
+  const auto deviation = [](double share) {
+    const CertifiedMesh plate = plate_lifted_by(0.1, share);
+    Change change(*plate.mesh);
+    PositionFit fit(*plate.mesh);
+    EXPECT_TRUE(change.prepare_relocate(kLifted, plate.mesh->vertex_position(kLifted)));
+    fit.gather(change);
+    return fit.fit(change, plate.mesh->position(kLifted)).deviation;
+  };
+  const double whole = deviation(1);
+  EXPECT_NEAR(deviation(0.25), 2 * whole, 1e-9 * whole);
+  EXPECT_TRUE(std::isfinite(deviation(0)));
+}
+
+// The tries at a vertex with very many faces are rationed by it.
+TEST(PositionFit, CountsThePointsThatItLooksAt) {
+  const CertifiedMesh plate = plate_lifted_by(0.1);
+  Change change(*plate.mesh);
+  PositionFit fit(*plate.mesh);
+  const dvec3 start = plate.mesh->position(kLifted);
+  ASSERT_TRUE(change.prepare_relocate(kLifted, plate.mesh->vertex_position(kLifted)));
+  EXPECT_EQ(fit.looked_at(), 0u);
+  fit.fit(change, start);
+  const std::size_t faces_alone = fit.looked_at();
+  EXPECT_GE(faces_alone, 6u * 10) << "six faces";
+  fit.gather(change);
+  fit.begin();
+  fit.fit(change, start);
+  EXPECT_GT(fit.looked_at(), faces_alone) << "pieces come on top";
+  fit.begin();
+  EXPECT_EQ(fit.looked_at(), 0u);
 }
 
 TEST(PositionFit, StaysWhereNothingDeviates) {
