@@ -394,7 +394,7 @@ def test_a_pixel_of_dragging_changes_the_tolerance_by_little():
     ):
         settings.tolerance_mode = mode
         setattr(settings, name, start)
-        yield from at_rest(beside=())
+        yield from at_rest()
         x, y = yield from find_property(name, 0.6)
         xdotool("mousemove", x, y)
         yield
@@ -404,7 +404,7 @@ def test_a_pixel_of_dragging_changes_the_tolerance_by_little():
             xdotool("mousemove", x + pixel, y)
             yield
         xdotool("mouseup", 1)
-        yield from at_rest(beside=())
+        yield from at_rest()
         assert start < getattr(settings, name) <= start + 24.01 * most
 
 
