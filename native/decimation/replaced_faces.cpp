@@ -27,6 +27,9 @@ constexpr double kWorthCutting = 0.25;
 constexpr double kFloor = 0.1;
 /// The number of parts that a search looks at before it gives up.
 constexpr std::size_t kMostParts = 512;
+/// After so many comparisons of parts with faces no further search begins: where hundreds of faces move, each of which
+/// lies along hundreds of those that they replace, their number grows with the square, and the reference knows sooner.
+constexpr std::size_t kMostComparisons = std::size_t{1} << 18;
 /// A list of no more faces than this is not worth shortening.
 constexpr std::size_t kFew = 8;
 
@@ -74,7 +77,7 @@ FaceBound ReplacedFaces::bound(const glm::dvec3 (&corners)[3], double limit, con
   constexpr double kNone = std::numeric_limits<double>::infinity();
   const double step = kStep * (limit - farthest_);
   const double near = kLookedFor * step, near2 = near * near, rounding = witness_error(2 * (1 + limit));
-  if (!(step >= kLeast * limit && near + rounding <= step)) return {};
+  if (!(step >= kLeast * limit && near + rounding <= step) || looked_at_ > kMostComparisons) return {};
   turned_.assign(faces_.size(), facing ? std::numbers::pi : 0);
   for (std::size_t i = 0; facing && i < faces_.size(); ++i) {
     if (normals_[i]) turned_[i] = angles_[i] + angle_bound(glm::dot(*normals_[i], facing->normal()));

@@ -10,6 +10,7 @@
 #include <glm/glm.hpp>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "base/errors.h"
@@ -43,13 +44,17 @@ std::vector<std::uint32_t> to_faces(const py::object& array, const std::string& 
 /// Takes an (n,) array of any integer type.
 std::vector<std::int32_t> to_labels(const py::object& array, const std::string& name);
 
-/// Takes an (n,) array of exactly one type and returns it in C order.
+/// Takes an (n,) array of exactly this type, double or bool, with a value for each of n vertices, and returns it in C
+/// order.
 template <class T>
-py::array_t<T, py::array::c_style> to_values(const py::object& array, const char* expected) {
+py::array_t<T, py::array::c_style> to_vertex_values(const py::object& array, const std::string& name, std::size_t n) {
+  const std::string type = std::is_same_v<T, bool> ? "bool" : "float64";
   if (!py::isinstance<py::array_t<T>>(array) || py::reinterpret_borrow<py::array>(array).ndim() != 1) {
-    throw InvalidInput(expected);
+    throw InvalidInput(name + " must be a " + type + " array, one value for each vertex");
   }
-  return py::array_t<T, py::array::c_style>(py::reinterpret_borrow<py::array>(array));
+  py::array_t<T, py::array::c_style> values(py::reinterpret_borrow<py::array>(array));
+  if (static_cast<std::size_t>(values.size()) != n) throw InvalidInput(name + " must have one value for each vertex");
+  return values;
 }
 
 Outside to_outside(const std::string& outside);

@@ -108,12 +108,12 @@ Decimated decimate_arrays(const py::object& vertices, const py::object& triangle
   options.target_triangles = static_cast<std::size_t>(target_triangles.value_or(0));
   py::array_t<bool, py::array::c_style> locked_values;
   if (!locked.is_none()) {
-    locked_values = to_values<bool>(locked, "locked must be a bool array, one value for each vertex");
+    locked_values = to_vertex_values<bool>(locked, "locked", v.values.size());
     options.locked = {locked_values.data(), static_cast<std::size_t>(locked_values.size())};
   }
   py::array_t<double, py::array::c_style> share_values;
   if (!shares.is_none()) {
-    share_values = to_values<double>(shares, "shares must be a float64 array, one value for each vertex");
+    share_values = to_vertex_values<double>(shares, "shares", v.values.size());
     options.shares = {share_values.data(), static_cast<std::size_t>(share_values.size())};
   }
   std::vector<std::uint32_t> labels;

@@ -28,7 +28,7 @@ HolesClosed close_holes_of_arrays(const py::object& vertices, const py::object& 
   options.max_normal_angle = max_normal_angle.value_or(options.max_normal_angle);
   py::array_t<double, py::array::c_style> share_values;
   if (!shares.is_none()) {
-    share_values = to_values<double>(shares, "shares must be a float64 array, one value for each vertex");
+    share_values = to_vertex_values<double>(shares, "shares", v.values.size());
     options.shares = {share_values.data(), static_cast<std::size_t>(share_values.size())};
   }
   options.threads = to_threads(threads);

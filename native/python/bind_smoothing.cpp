@@ -54,12 +54,12 @@ Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, 
   options.max_normal_angle = max_normal_angle.value_or(options.max_normal_angle);
   py::array_t<bool, py::array::c_style> locked_values;
   if (!locked.is_none()) {
-    locked_values = to_values<bool>(locked, "locked must be a bool array, one value for each vertex");
+    locked_values = to_vertex_values<bool>(locked, "locked", v.values.size());
     options.locked = {locked_values.data(), static_cast<std::size_t>(locked_values.size())};
   }
   py::array_t<double, py::array::c_style> strength_values;
   if (!strength.is_none()) {
-    strength_values = to_values<double>(strength, "strength must be a float64 array, one value for each vertex");
+    strength_values = to_vertex_values<double>(strength, "strength", v.values.size());
     options.strength = {strength_values.data(), static_cast<std::size_t>(strength_values.size())};
   }
   options.threads = to_threads(threads);

@@ -48,6 +48,21 @@ TEST(ReplacedFaces, LookAtTheFacesNearEachPart) {
   EXPECT_LT(faces.looked_at(), 10u * 400);  // there are more than a hundred parts
 }
 
+// A change that moves a vertex with very many faces asks for a bound of each of them.
+TEST(ReplacedFaces, BeginNoFurtherSearchAfterVeryManyComparisons) {
+  const TriangleMesh mesh = shapes::fan(400, 0);
+  ReplacedFaces faces = faces_of(mesh, 0);
+  const dvec3 over_forty[3] = {mesh.vertices[1], mesh.vertices[41], 0.3 * mesh.vertices[21]};
+  std::size_t searches = 0, before = 0;
+  for (; faces.bound(over_forty, kWithin, nullptr).distance <= kWithin; ++searches) {
+    ASSERT_LT(searches, 10'000u);
+    before = faces.looked_at();
+  }
+  EXPECT_GT(searches, 50u);
+  EXPECT_EQ(faces.looked_at(), before) << "the last one gave up at once";
+  EXPECT_LT(faces.looked_at(), 400'000u) << "where the reference would have been asked long ago";
+}
+
 TEST(ReplacedFaces, TakeAShareOfTheRoomThatIsLeftAndNoMore) {
   // A corner a little above their plane each time.
   const TriangleMesh mesh = shapes::fan(7, 0);

@@ -203,6 +203,7 @@ def test_bad_input():
         (lambda: close(max_normal_angle=0.0), "max_normal_angle"),
         (lambda: close(max_normal_angle=181.0), "max_normal_angle"),
         (lambda: close(shares=np.ones(3)), "shares"),
+        (lambda: close(shares=np.ones(0)), "shares"),
         (lambda: close(shares=np.full(len(VERTICES), 1.5)), "vertex 0"),
         (lambda: close(threads=0), "threads"),
         (lambda: close(to_world=np.zeros((4, 4))), "to_world"),

@@ -141,6 +141,7 @@ def test_bad_to_world(to_world, message):
         ({"locked": np.zeros(5, bool)}, "locked.*each vertex"),
         ({"locked": np.zeros(288, np.float64)}, "locked.*bool"),
         ({"shares": np.ones(5)}, "shares.*each vertex"),
+        ({"shares": np.ones(0)}, "shares.*each vertex"),
         ({"shares": np.ones(288, np.float32)}, "shares.*float64"),
         ({"shares": np.array([1.0] * 287 + [1.5])}, "shares.*0 to 1.*vertex 287"),
         ({"shares": np.array([np.nan] + [1.0] * 287)}, "shares.*0 to 1.*vertex 0"),

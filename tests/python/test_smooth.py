@@ -161,6 +161,7 @@ def test_threads_change_nothing(volume):
         ({"mode": "stop"}, "mode must be"),
         ({"outside": "ignore"}, "outside must be"),
         ({"locked": np.zeros(3, bool)}, "locked must have one value"),
+        ({"locked": np.zeros(0, bool)}, "locked must have one value"),
         ({"locked": np.zeros(len(VERTICES))}, "locked must be a bool array"),
         ({"strength": np.ones(3)}, "strength must have one value"),
         ({"strength": np.ones(len(VERTICES), np.float32)}, "strength must be a float64 array"),
