@@ -81,7 +81,9 @@ def _volume(ob):
     volume = built.volume_of(ob)
     if volume is None:
         return None
-    return f"The tolerance volume of {ob.name} took {volume.seconds:.2f} s and has {volume.memory / 1e6:.3g} MB"
+    return (
+        f"The tolerance volume of {ob.name} took {volume.seconds:.2f} s to build and takes {volume.memory / 1e6:.3g} MB"
+    )
 
 
 def _chosen(context, name, otherwise):

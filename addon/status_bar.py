@@ -21,10 +21,10 @@ def show(text):
         _given.add(window.workspace.name)
 
 
-def say(text):
-    """Shows the text for _SECONDS: timers and handlers cannot report messages."""
+def say(text, seconds=_SECONDS):
+    """Shows the text for so many seconds: timers and handlers cannot report messages."""
     show(text)
-    bpy.app.timers.register(_remove, first_interval=_SECONDS, persistent=True)
+    bpy.app.timers.register(_remove, first_interval=seconds, persistent=True)
 
 
 def showing():

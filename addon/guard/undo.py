@@ -12,6 +12,9 @@ import bpy
 from .. import status_bar
 from . import edit
 
+# The user sees the edit vanish, and has to have time to read why.
+_SECONDS = 15.0
+
 _item = None  # (keymap, its item) while there is an edit to undo
 _sent_for = None  # (watch, last operator) for which the last mouse move was sent
 
@@ -32,7 +35,7 @@ class TOLVOL_OT_guard_undo(bpy.types.Operator):
         label = operators[-1].name if operators else "The last step"
         said = f"{label} was undone: {ob.name} would {edit.watches.shown(ob).would}"
         edit.undo()  # After it there may be another watch, and another object in Blender's memory.
-        status_bar.say(said)
+        status_bar.say(said, _SECONDS)
         return {"FINISHED", "PASS_THROUGH"}
 
 

@@ -148,6 +148,9 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
                 snapshots.set_reference(ob, outcomes[0][1])
             undo.pop_all()
         shared.give(self, ob.tolvol.lod, lod_settings())
+        earlier = chain(ob)[1:]
+        # An exporter that takes objects, or the collection, by name gets the new levels.
+        _rename_earlier(ob, [ob.tolvol.lods, *earlier] if ob.tolvol.lods else [])
         collection = bpy.data.collections.new(f"{ob.name}_LODs")
         context.scene.collection.children.link(collection)
         levels, runs = [], [run for _, _, _, run in outcomes]
@@ -162,7 +165,6 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             level[GEOMETRIC_ERROR] = max(run["forward"][1], run["backward"][1])
             context.view_layer.update()
             decimation.keep(self, level, outcome, write.layout, f"{level.name}: ")
-        earlier = chain(ob)[1:]
         # An earlier level that is shown in place of the object gives way to it.
         if ob.hide_get() and any(level.visible_get() for level in earlier):
             ob.hide_render = False
@@ -228,6 +230,15 @@ def chain(ob):
     made = source.tolvol.lods.objects if source.tolvol.lods else ()
     # A copy of the object has its collection, but the levels are not those of the copy.
     return [source, *(each for each in made if each.tolvol.lod_of == source)]
+
+
+def _rename_earlier(ob, datablocks):
+    """Renames what has a name of levels of `ob`, and the meshes of such objects, so that new levels can have these names."""
+    for each in datablocks:
+        if each.name.startswith(f"{ob.name}_LOD"):
+            each.name = f"{each.name}_earlier"
+            if isinstance(each, bpy.types.Object):
+                each.data.name = each.name
 
 
 def _show(context, ob):

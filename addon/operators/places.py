@@ -36,7 +36,8 @@ def described(context, ob):
     if place.beyond:
         faces = "1 triangle" if place.faces == 1 else f"{place.faces:,} triangles"
         more = f"; {regions:,} regions in all" if regions > len(found) else ""
-        lines.append(f"Not proved to be within: {faces}, {area(context, place.area)}{more}")
+        beyond = f", {area(context, place.area)} of them beyond" if place.area > 0 else ""
+        lines.append(f"Not proved to be within: {faces}{beyond}{more}")
     else:
         lines.append("Within the tolerance")
     return lines

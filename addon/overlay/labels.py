@@ -27,7 +27,8 @@ def draw(context, page, taken):
         if spot is None:
             continue
         if not true:
-            lines = [f"{i + 1}: {distance_text(context, found)}, out of date"]
+            why = "out of date" if ob.mode == "OBJECT" else "read in Object Mode"
+            lines = [f"{i + 1}: {distance_text(context, found)}, {why}"]
         elif i == settings.label_index:
             lines = described(context, ob, found)
             lines[0] = f"{i + 1}: {lines[0]}"

@@ -242,6 +242,16 @@ def free_part(context):
     return left, right, bottom
 
 
+def adjusting(context):
+    """Returns (left, bottom, width, height) of each panel of *Adjust Last Operation* over the view, in pixels of the region."""
+    region = context.region
+    return [
+        (other.x - region.x, other.y - region.y, other.width, other.height)
+        for other in context.area.regions
+        if other.type == "HUD" and other.width > 1 and other.height > 1
+    ]
+
+
 # Pointer of a 3D view -> where the user has put its legend: the share of the free way from the left and from below.
 _moved = {}
 # Pointer of a region -> (left, bottom, width, height) of the legend that was last drawn there.
@@ -313,8 +323,7 @@ def _corner(context, width, height, margin):
     if place := moved(context):
         return tuple(least + share * free for least, share, free in zip(low, place, room))
     left, bottom = low[0] + room[0], low[1]
-    for other in context.area.regions:
-        # Adjust Last Operation lies in the lower left corner.
-        if other.type == "HUD" and other.width > 1 and other.x - context.region.x + other.width > left:
-            bottom = max(bottom, other.y - context.region.y + other.height)
+    for x, y, other_width, other_height in adjusting(context):
+        if x + other_width > left:
+            bottom = max(bottom, y + other_height)
     return (left, bottom) if bottom <= low[1] + room[1] else None

@@ -11,6 +11,8 @@ from . import legend, shaders
 # Pixels at an interface scale of 1: the arms of a cross, the gap in its middle, and the distance of the box from it.
 _ARM, _PRESENT_ARM, _GAP = 6, 16, 4
 _ROW, _MARGIN = 17, 8
+# A box that takes a larger share of the view shows no more than the number of the place.
+_MUCH = 0.15
 INK, EDGE = (1, 1, 1, 1), (0, 0, 0, 0.8)
 
 
@@ -33,8 +35,10 @@ def draw(context, page, taken):
                 _cross(page, *spot, arm)
     if spots[at] is None:
         return None
-    box, away = Box(page, described(context, ob)), 2 * _PRESENT_ARM * page.scale
-    return box.draw_beside(context, *spots[at], away, taken)
+    box = Box(page, described(context, ob))
+    if box.covers_much(context):
+        box = Box(page, [f"{at + 1} of {len(found)}"])
+    return box.draw_beside(context, *spots[at], 2 * _PRESENT_ARM * page.scale, taken)
 
 
 def in_view(context, position):
@@ -64,6 +68,11 @@ class Box:
         self._margin, self._row = _MARGIN * page.scale, _ROW * page.scale
         self._lines = [legend.shortened(line, page.room - 2 * self._margin) for line in lines]
         self.size = max(map(page.width, self._lines)) + 2 * self._margin, len(lines) * self._row + self._margin
+
+    def covers_much(self, context):
+        """Whether the box takes more than _MUCH of the free part of the view."""
+        left, right, low = legend.free_part(context)
+        return self.size[0] * self.size[1] > _MUCH * (right - left) * (context.region.height - low)
 
     def beside(self, context, x, y, away, others=()):
         """Returns (left, bottom, width, height) beside a place, or else above or below it, in the free part of the view:

@@ -5,7 +5,7 @@ A place is a connected region of faces that are not proved to be within the tole
 vertices whose distance is larger than that of their neighbours, and the point with the largest distance.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,9 +28,9 @@ class Place:
     beyond: bool  # whether it is a region that is not proved to be within the tolerance
     distance: Interval  # the largest distance in the region
     position: np.ndarray  # (3,) the point of the largest distance, in the world
-    normal: np.ndarray  # (3,) of the surface there; it is 0 where the surface has none
+    normal: np.ndarray  # (3,) of the surface there, away from the inside of a solid; it is 0 where the surface has none
     radius: float  # the distance of the farthest corner of the region from the position
-    area: float  # of the region, in the world
+    area: float  # of the part of the region that is beyond the tolerance, in the world, as the legend estimates it
     faces: int  # the number of triangles of the region
 
 
@@ -52,7 +52,18 @@ def find(surface, reference, found, threads=None, progress=None):
             beyond = _regions(own, np.flatnonzero(triangles))
             regions += len(beyond)
             places += _measured(on_reference, own, other, largest, beyond, found.tolerance, threads, progress)
+    inwards = {on_reference for on_reference, own, _, _ in ways if _looks_inwards(own, threads, progress)}
+    places = [replace(place, normal=-place.normal) if place.on_reference in inwards else place for place in places]
     return sorted(places, key=lambda place: -place.distance.upper), regions
+
+
+def _looks_inwards(surface, threads, progress):
+    """Whether the faces of a solid show their backs to whoever looks at it from outside."""
+    arrays = surface.arrays
+    found = native.module.solidity(
+        arrays.vertices, arrays.triangles, to_world=surface.matrix, threads=threads or None, progress=progress
+    )
+    return found["volume"] is not None and found["volume"] < 0
 
 
 def _regions(surface, chosen):
@@ -85,13 +96,24 @@ def _measured(on_reference, own, other, largest, regions, tolerance, threads, pr
     distance = np.zeros(len(vertices))
     distance[corners] = _distances(other, vertices[corners], tolerance, threads, progress)
     regions = sorted(regions, key=lambda region: -distance[triangles[region]].max())
+    tree = native.module.DisplayTree(volumes.native_volume(other, tolerance, threads, progress), progress=progress)
     places = []
     for region in regions[:MOST]:
         measured = largest
         if largest.triangle not in region:
             measured = measure.largest_distance((vertices, triangles[region]), target, None, threads, progress)
             measured = Interval(measured.lower, measured.upper, measured.position, int(region[measured.triangle]))
-        places.append(_place(on_reference, vertices, triangles, region, measured, True))
+        place = _place(on_reference, vertices, triangles, region, measured, True)
+        # The two shares are those of what is within and of what is beyond, on either side.
+        within = tree.shares(
+            own.arrays.vertices,
+            triangles[region],
+            [-tolerance, tolerance],
+            to_world=own.matrix,
+            threads=threads or None,
+            progress=progress,
+        )[1]
+        places.append(replace(place, area=place.area * (1 - within)))
     return places
 
 

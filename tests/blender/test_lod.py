@@ -313,7 +313,7 @@ def test_levels_are_made_again_of_the_object_while_a_level_is_shown():
     ob.tolvol.lod.levels, ob.tolvol.lod.percentages = 3, padded(0.3, 1, 2)
     assert bpy.ops.tolvol.make_lods() == {"FINISHED"}
     levels = list(ob.tolvol.lods.objects)
-    assert [level.name for level in levels] == ["torus_LOD1.001", "torus_LOD2.001", "torus_LOD3"]
+    assert [level.name for level in levels] == ["torus_LOD1", "torus_LOD2", "torus_LOD3"]
     assert seen() == ["torus"] and bpy.context.active_object == ob
 
 
@@ -345,6 +345,15 @@ def test_levels_whose_object_was_deleted_are_objects_of_their_own():
     assert bpy.context.active_object == levels[0] and not bpy.ops.tolvol.show_level.poll()
     assert bpy.ops.tolvol.make_lods() == {"FINISHED"}
     assert seen() == [levels[0].name] and levels[0].tolvol.lods is not None
+
+
+def test_the_levels_of_a_second_chain_have_the_names_and_the_collection():
+    ob = torus()
+    earlier = make(levels=2, percentages=padded(0.3, 1))
+    levels = make(levels=2, percentages=padded(1, 3))
+    assert [level.name for level in levels] == ["torus_LOD1", "torus_LOD2"]
+    assert set(bpy.data.collections["torus_LODs"].objects) == set(levels) and ob.tolvol.lods.name == "torus_LODs"
+    assert set(bpy.data.collections["torus_LODs_earlier"].objects) == set(earlier)
 
 
 @pytest.mark.parametrize("how", ["exclude", "hide_viewport"])

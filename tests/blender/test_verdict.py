@@ -18,6 +18,7 @@ from addon.panels import deviation
 from addon.proof import verdict
 from addon.proof.verdict import FAIL, NOT_CHECKED, PASS, Interval, Verdict
 from addon.shared.numbers import NO_BREAK
+from addon.shared.proof import report
 from scenes import sheet, torus
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -43,9 +44,24 @@ def test_the_word_is_about_the_directions_that_have_to_be_kept(forward, backward
     assert tuple(verdict.ways for verdict in found) == ways
 
 
+@pytest.mark.parametrize(
+    ("largest", "shown", "margin"),
+    (
+        (0.98765, "98.8 %", "1.2 %"),
+        (0.998051, "99.9 %", "0.1 %"),
+        (0.003, "0.300 %", "99.7 %"),
+        (0.99951, "100 %", "<0.1 %"),
+        (1.23451, "124 %", "24 %"),
+        (1.003541, "100.36 %", "0.36 %"),
+        (10.23, "1,030 %", "930 %"),
+    ),
+)
+def test_margin_and_largest_distance_make_100_percent(largest, shown, margin):
+    assert report.percent(largest, 1) == shown
+    assert judged((0, largest), (0, 0)).margin_percent() == margin
+
+
 def test_the_margin_never_looks_better_than_it_is():
-    assert judged((0, 0.98765), (0, 0.5)).margin_percent() == "1.23 %"
-    assert judged((0, 1.23451), (0, 0.5)).margin_percent() == "23.5 %"
     assert judged((0, 0.5), (0, 0.98765), two_sided=False).margin_percent() == "50.0 %"
     assert judged((0, 1), (0, 1)).margin_percent() == "0 %"
     assert judged((0, 0), (0, 0)).margin_percent() == "100 %"

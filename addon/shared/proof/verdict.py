@@ -8,7 +8,7 @@ Verdict, so they always agree.
 import math
 from dataclasses import dataclass, replace
 
-from ..numbers import NO_BREAK, three_digits
+from ..numbers import NO_BREAK
 
 # The words for the outcome that are shown everywhere.
 PASS, FAIL, NOT_CHECKED = "PASS", "FAIL", "NOT CHECKED"
@@ -100,13 +100,21 @@ class Verdict:
     def margin_percent(self):
         """Returns the margin without its sign as text in percent of the tolerance.
 
-        It is rounded down if the mesh passed and else up, so that it never looks better than it is.
+        It is rounded down if the mesh passed and else up, so that it never looks better than it is, and to the last digit of
+        the largest distance in percent: together the two texts make 100 %.
         """
         share = 100 * abs(self.margin) / self.tolerance
         if not share:
             return "0 %"
-        step = 10.0 ** (math.floor(math.log10(share)) - 2)
-        return three_digits((math.floor if self.passed else math.ceil)(share / step) * step) + " %"
+        if self.passed:
+            digits = 2 - math.floor(math.log10(max(share, 100 - share)))
+            steps = math.floor(round(share * 10.0**digits, 6))
+        else:
+            # report.percent() has more digits just above 100 %.
+            digits = (1 if share < 1 else 2) - math.floor(math.log10(share if share < 1 else 100 + share))
+            steps = math.ceil(round(share * 10.0**digits, 6))
+        digits, least = max(digits, 0), 10.0**-digits
+        return f"{steps * least:,.{digits}f} %" if steps else f"<{least:g} %"
 
     @property
     def forward_within(self):
