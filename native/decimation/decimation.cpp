@@ -18,6 +18,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+/// If the collapses after a refinement remove more than this share of the triangles, the mesh is refined again: of
+/// parts of slivers this removes up to a quarter, and of scans hardly anything.
+constexpr double kWorthAnotherTime = 0.01;
+
 class Decimation {
  public:
   Decimation(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const StoredSpace& space,
@@ -45,7 +49,7 @@ class Decimation {
         });
     if (mesh.certified() && options_.effort == DecimationOptions::Effort::thorough && !result_.stopped_at_time) {
       until([this] { return is_out_of_time() || is_asked_to_finish(); },
-            [&] { Refinement(mesh, crossings ? &*crossings : nullptr, team_).run(target, options_.progress); });
+            [&] { refine(mesh, crossings ? &*crossings : nullptr, target); });
     }
     result_.stopped_at_target =
         options_.target_triangles > 0 && mesh.triangle_count() + apart <= options_.target_triangles;
@@ -54,6 +58,16 @@ class Decimation {
   }
 
  private:
+  /// Refines the mesh and collapses the edges that can then collapse alone, as long as that is worth another time.
+  void refine(BoundedMesh& mesh, NewCrossings* crossings, std::size_t target) {
+    for (;;) {
+      Refinement(mesh, crossings, team_).run(target, options_.progress);
+      const auto refined = static_cast<double>(mesh.triangle_count());
+      collapse_once_more(mesh, crossings, target, team_, options_.progress);
+      if (static_cast<double>(mesh.triangle_count()) > (1 - kWorthAnotherTime) * refined) return;
+    }
+  }
+
   /// Thorough leaves as many triangles without it, and so does fast where each vertex stays where it was. A cell that
   /// holds only a part of the reference does without it to save time: in a large mesh a later round usually decimates
   /// again what the first round leaves.

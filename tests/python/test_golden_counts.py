@@ -12,6 +12,8 @@ import judge
 import meshes
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmark"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from fuzzing import kinds  # noqa: E402
 from least_open import least_open  # noqa: E402
 
 ALLOWANCE = 1.03
@@ -61,6 +63,13 @@ def test_no_more_triangles_are_left_than_recorded(name, percent):
     counts = left(volumes), left(few, effort="thorough"), left(few, placement="subset")
     for count, recorded in zip(counts, COUNTS[name, percent], strict=True):
         assert count <= ALLOWANCE * recorded, f"fast, thorough and subset leave {counts}"
+
+
+def test_thorough_refines_a_part_of_slivers_again_after_collapses_alone():
+    """It left 642 of this gear while nothing came after the refinement."""
+    vertices, triangles = kinds.KINDS["gear"](np.random.default_rng(1), 4000)
+    volume = tolvol.ToleranceVolume(vertices, triangles, 0.01 * tolvol.diagonal(vertices, triangles))
+    assert len(tolvol.decimate(vertices, triangles, volume, effort="thorough").triangles) <= ALLOWANCE * 504
 
 
 def test_fast_asks_again_where_the_sheets_of_a_wall_met():
