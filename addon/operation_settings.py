@@ -79,11 +79,11 @@ def decimate_settings(options=frozenset()):
             name="Effort",
             description="How much time the decimation may spend to leave fewer triangles",
             items=(
-                ("FAST", "Fast", "Remove triangles in one pass"),
+                ("FAST", "Fast", "Remove triangles by collapsing edges, each by itself"),
                 (
                     "THOROUGH",
                     "Thorough",
-                    "After the pass of Fast, move vertices around each further collapse together. This leaves a "
+                    "After Fast, move vertices around each further collapse together. This leaves a "
                     "third fewer triangles in 5 to 25 times the processor time. Some hundred triangles may take 75 "
                     "times as long, and 20 seconds",
                 ),

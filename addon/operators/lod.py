@@ -150,7 +150,8 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
         shared.give(self, ob.tolvol.lod, lod_settings())
         earlier = chain(ob)[1:]
         # An exporter that takes objects, or the collection, by name gets the new levels.
-        _rename_earlier(ob, [ob.tolvol.lods, *earlier] if ob.tolvol.lods else [])
+        if ob.tolvol.lods:
+            _rename_earlier(ob, [ob.tolvol.lods, *earlier, *(level.data for level in earlier)])
         collection = bpy.data.collections.new(f"{ob.name}_LODs")
         context.scene.collection.children.link(collection)
         levels, runs = [], [run for _, _, _, run in outcomes]
@@ -233,12 +234,10 @@ def chain(ob):
 
 
 def _rename_earlier(ob, datablocks):
-    """Renames what has a name of levels of `ob`, and the meshes of such objects, so that new levels can have these names."""
+    """Renames those of the datablocks that have names of levels of `ob`, so that new levels can have these names."""
     for each in datablocks:
         if each.name.startswith(f"{ob.name}_LOD"):
             each.name = f"{each.name}_earlier"
-            if isinstance(each, bpy.types.Object):
-                each.data.name = each.name
 
 
 def _show(context, ob):

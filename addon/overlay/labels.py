@@ -27,7 +27,7 @@ def draw(context, page, taken):
         if spot is None:
             continue
         if not true:
-            why = "out of date" if ob.mode == "OBJECT" else "read in Object Mode"
+            why = "out of date" if ob.mode == "OBJECT" else "not compared in this mode"
             lines = [f"{i + 1}: {distance_text(context, found)}, {why}"]
         elif i == settings.label_index:
             lines = described(context, ob, found)

@@ -63,7 +63,9 @@ def _looks_inwards(surface, threads, progress):
     found = native.module.solidity(
         arrays.vertices, arrays.triangles, to_world=surface.matrix, threads=threads or None, progress=progress
     )
-    return found["volume"] is not None and found["volume"] < 0
+    # The volume is that of the faces as they are stored. A mirrored object turns their triangles, and so their normals.
+    mirrored = np.linalg.det(surface.matrix[:3, :3]) < 0
+    return found["volume"] is not None and (found["volume"] < 0) != mirrored
 
 
 def _regions(surface, chosen):
@@ -104,16 +106,15 @@ def _measured(on_reference, own, other, largest, regions, tolerance, threads, pr
             measured = measure.largest_distance((vertices, triangles[region]), target, None, threads, progress)
             measured = Interval(measured.lower, measured.upper, measured.position, int(region[measured.triangle]))
         place = _place(on_reference, vertices, triangles, region, measured, True)
-        # The two shares are those of what is within and of what is beyond, on either side.
-        within = tree.shares(
+        below, _, above = tree.shares(
             own.arrays.vertices,
             triangles[region],
             [-tolerance, tolerance],
             to_world=own.matrix,
             threads=threads or None,
             progress=progress,
-        )[1]
-        places.append(replace(place, area=place.area * (1 - within)))
+        )
+        places.append(replace(place, area=place.area * (below + above)))
     return places
 
 

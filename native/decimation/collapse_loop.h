@@ -69,7 +69,7 @@ class CollapseLoop {
   /// The tries at a vertex with many faces around it; each costs as much as there are faces.
   struct Crowd {
     std::uint32_t faces;  ///< The number of faces around it at the first try.
-    std::uint64_t work;   ///< All faces, and parts of the reference's pieces, that the tries looked at.
+    std::uint64_t work;   ///< All faces, parts of the reference's pieces and points of fits that the tries looked at.
   };
 
   /// An edge that was refused because faces would have crossed.

@@ -219,9 +219,8 @@ void collapse_edges(BoundedMesh& mesh, NewCrossings* crossings, std::size_t targ
   rounds.whole(target, begins_anew ? kPasses : 1, has_rounds && begins_anew);
 }
 
-void collapse_once_more(BoundedMesh& mesh, NewCrossings* crossings, std::size_t target, Team& team,
-                        Progress* progress) {
-  Rounds(mesh, crossings, team, progress).whole(target, 1, false);
+void collapse_once_more(BoundedMesh& mesh, NewCrossings* crossings, std::size_t target, Team& team) {
+  Rounds(mesh, crossings, team, nullptr).whole(target, 1, false);
 }
 
 }  // namespace tolvol

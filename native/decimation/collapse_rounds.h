@@ -26,7 +26,8 @@ namespace tolvol {
 void collapse_edges(BoundedMesh& mesh, NewCrossings* crossings, std::size_t target, bool begins_anew, Team& team,
                     Progress* progress);
 
-/// Collapses the edges that can still collapse, in one loop over the whole mesh, after other changes than collapses.
-void collapse_once_more(BoundedMesh& mesh, NewCrossings* crossings, std::size_t target, Team& team, Progress* progress);
+/// Collapses the edges that can still collapse, in one loop over the whole mesh, after other changes than collapses. It
+/// begins no stage of progress: for the user it belongs to the changes before it.
+void collapse_once_more(BoundedMesh& mesh, NewCrossings* crossings, std::size_t target, Team& team);
 
 }  // namespace tolvol

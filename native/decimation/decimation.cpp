@@ -63,7 +63,7 @@ class Decimation {
     for (;;) {
       Refinement(mesh, crossings, team_).run(target, options_.progress);
       const auto refined = static_cast<double>(mesh.triangle_count());
-      collapse_once_more(mesh, crossings, target, team_, options_.progress);
+      collapse_once_more(mesh, crossings, target, team_);
       if (static_cast<double>(mesh.triangle_count()) > (1 - kWorthAnotherTime) * refined) return;
     }
   }

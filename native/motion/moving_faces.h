@@ -65,7 +65,7 @@ class MovingFaces {
   void for_each_near_elsewhere(std::uint32_t face, At&& at, Visit&& visit) const {
     search(Shared::left_out, none_apart, face, at, visit);
   }
-  /// The same for a triangle with these corners, where `at` has all hubs at points. Those around a hub that are apart
+  /// As for_each_near(face, at, visit), for a triangle with these corners, where `at` has all hubs at points. Those around a hub that are apart
   /// from it as seen from there are left out, too; so may be the face itself.
   template <class At, class Visit>
   void for_each_near(std::uint32_t face, const Corners& corners, At&& at, Visit&& visit) const {

@@ -245,8 +245,8 @@ wedges : (m, 3) integer array, optional
     Labels of corners, from the function wedges. Seams between corners of different labels are kept.
 effort : {"fast", "thorough"}
     "thorough" then collapses further edges and moves all vertices around each together. It leaves a third fewer
-    triangles in 6 to 35 times the processor time, at a tolerance of 0.1 % in 20 to 45 times. A mesh of some hundred
-    triangles may take 20 seconds.
+    triangles in 5 to 25 times the processor time. A mesh of some hundred triangles may take 75 times as long, and 20
+    seconds. Where edges can collapse alone after that, as in parts of slivers, it does all of it again.
 crossings : {"keep_out", "allow"}
     Two faces cross if they meet anywhere but in the corners and edges that they share. "keep_out" makes no new
     crossing: each input face is stood for by one face of the result, and two faces of the result cross only if input

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from mathutils import Quaternion
+from mathutils import Matrix, Quaternion
 
 from addon.mesh import mesh_io
 from addon.operators import places as operators
@@ -113,9 +113,10 @@ def test_an_untouched_mesh_has_one_place_in_each_direction():
     assert len(places.shown(ob)[0]) == 2
 
 
+@pytest.mark.parametrize("mirrored", (False, True))
 @pytest.mark.parametrize("inwards", (False, True))
-def test_a_place_on_a_solid_is_seen_from_outside_whichever_way_its_faces_look(inwards):
-    ob = torus()
+def test_a_place_on_a_solid_is_seen_from_outside_whichever_way_its_faces_look(inwards, mirrored):
+    ob = torus(matrix=Matrix.Diagonal((-1, 1, 1, 1))) if mirrored else torus()
     if inwards:
         ob.data.flip_normals()
         changed(ob)

@@ -198,7 +198,7 @@ TEST(DecimationCrossings, TheirNumberNeverRises) {
       if (effort == Options::Effort::thorough && (seed > 0 || kSanitized) && !is_full_run()) continue;
       Options options;
       options.effort = effort;
-      c.percent = effort == Options::Effort::thorough ? 2 : 1;  // Thorough takes the time of what is left.
+      c.percent = effort == Options::Effort::thorough ? 2 : 1;  // Thorough takes longer the more triangles are left.
       const DecimationResult r = run(c, options);
       const std::size_t of_result = count(r.vertices, r.triangles);
       EXPECT_LE(of_result, of_input) << "seed " << seed;

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <numeric>
 #include <set>
+#include <span>
 
 #include "motion/moving_crossings.h"
 #include "polls.h"
@@ -166,7 +167,7 @@ TEST(MovingFaces, ElsewhereAreAllWithoutTheHub) {
     fan.near.for_each_near_elsewhere(f, fan.at(), [&](std::uint32_t other) { return elsewhere.insert(other).second; });
     looked_at += elsewhere.size();
     const auto has_hub = [&](std::uint32_t face) {
-      return std::ranges::count(&fan.faces[3 * face], &fan.faces[3 * face + 3], 0u) > 0;
+      return std::ranges::count(std::span(fan.faces).subspan(std::size_t{3} * face, 3), 0u) > 0;
     };
     for (const std::uint32_t other : fan.found(f, false)) {
       EXPECT_EQ(elsewhere.contains(other), !(has_hub(f) && has_hub(other))) << f << " and " << other;

@@ -283,6 +283,15 @@ TEST(Refinement, KeepsWhatThereIsOnRequest) {
   EXPECT_GT(kept.triangles.size(), run(c, thorough()).triangles.size());
 }
 
+// The add-on lets Esc keep the result while this stage lasts.
+TEST(Refinement, TheCollapsesAfterItBelongToItsStage) {
+  Options options = thorough();
+  Progress progress;
+  options.progress = &progress;
+  run(torus(), options);
+  EXPECT_STREQ(progress.stage(), "refining");
+}
+
 TEST(Refinement, EndsAtOnceOnRequestWithWhatIsProved) {
   const Case c{shapes::torus(across(40), 0.002), glm::dmat4(1), Storage::float32, kPercent};
   Options options = thorough();

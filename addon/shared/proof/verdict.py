@@ -101,18 +101,18 @@ class Verdict:
         """Returns the margin without its sign as text in percent of the tolerance.
 
         It is rounded down if the mesh passed and else up, so that it never looks better than it is, and to the last digit of
-        the largest distance in percent: together the two texts make 100 %.
+        the largest distance in percent. Where that is 10 % or more, the two texts together make 100 %.
         """
         share = 100 * abs(self.margin) / self.tolerance
         if not share:
             return "0 %"
         if self.passed:
             digits = 2 - math.floor(math.log10(max(share, 100 - share)))
-            steps = math.floor(round(share * 10.0**digits, 6))
+            steps = math.floor(share * 10.0**digits + 1e-4)
         else:
             # report.percent() has more digits just above 100 %.
             digits = (1 if share < 1 else 2) - math.floor(math.log10(share if share < 1 else 100 + share))
-            steps = math.ceil(round(share * 10.0**digits, 6))
+            steps = math.ceil(share * 10.0**digits - 1e-4)
         digits, least = max(digits, 0), 10.0**-digits
         return f"{steps * least:,.{digits}f} %" if steps else f"<{least:g} %"
 

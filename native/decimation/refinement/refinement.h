@@ -37,7 +37,7 @@ class Refinement {
     std::size_t most_failures_, failures_ = 0;
   };
 
-  /// How many searches the tries of all rounds together may take (PatchTrial::work()).
+  /// How many searches the tries of all rounds of one Refinement may take (PatchTrial::work()).
   class Budget {
    public:
     /// From now on as much as was taken so far, and some more. Before, there is no limit.
