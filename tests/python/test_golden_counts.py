@@ -14,6 +14,7 @@ import meshes
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmark"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from fuzzing import kinds  # noqa: E402
+
 from least_open import least_open  # noqa: E402
 
 ALLOWANCE = 1.03
