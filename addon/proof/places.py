@@ -52,20 +52,20 @@ def find(surface, reference, found, threads=None, progress=None):
             beyond = _regions(own, np.flatnonzero(triangles))
             regions += len(beyond)
             places += _measured(on_reference, own, other, largest, beyond, found.tolerance, threads, progress)
-    inwards = {on_reference for on_reference, own, _, _ in ways if _looks_inwards(own, threads, progress)}
-    places = [replace(place, normal=-place.normal) if place.on_reference in inwards else place for place in places]
+    turned = {on_reference for on_reference, own, _, _ in ways if _is_turned(own, threads, progress)}
+    places = [replace(place, normal=-place.normal) if place.on_reference in turned else place for place in places]
     return sorted(places, key=lambda place: -place.distance.upper), regions
 
 
-def _looks_inwards(surface, threads, progress):
-    """Whether the faces of a solid show their backs to whoever looks at it from outside."""
+def _is_turned(surface, threads, progress):
+    """Whether the triangles in the world show their backs to whoever looks at the surface from outside."""
     arrays = surface.arrays
     found = native.module.solidity(
         arrays.vertices, arrays.triangles, to_world=surface.matrix, threads=threads or None, progress=progress
     )
-    # The volume is that of the faces as they are stored. A mirrored object turns their triangles, and so their normals.
-    mirrored = np.linalg.det(surface.matrix[:3, :3]) < 0
-    return found["volume"] is not None and (found["volume"] < 0) != mirrored
+    # The volume is that of the faces as they are stored. A mirrored object turns their triangles.
+    inwards = found["volume"] is not None and found["volume"] < 0
+    return inwards != bool(np.linalg.det(surface.matrix[:3, :3]) < 0)
 
 
 def _regions(surface, chosen):

@@ -129,6 +129,18 @@ def test_a_place_on_a_solid_is_seen_from_outside_whichever_way_its_faces_look(in
     assert all(place.normal[2] > 0 for place in found) and {place.on_reference for place in found} == {False, True}
 
 
+def test_a_place_on_a_mirrored_sheet_is_seen_from_its_front():
+    ob = sheet(bumps=0.0)
+    ob.matrix_world = Matrix.Diagonal((-1, 1, 1, 1))
+    bpy.context.view_layer.update()
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    ob.data.vertices[500].co.z = 0.3
+    changed(ob)
+    assert bpy.ops.tolvol.worst_point() == {"FINISHED"}
+    found, _, _ = places.shown(ob)
+    assert found and all(place.normal[2] > 0 for place in found)
+
+
 def test_triangles_with_vertices_of_their_own_are_one_region():
     vertices, quads = sheet_arrays(bumps=0.0)
     ob = add_object("soup", vertices[quads].reshape(-1, 3), np.arange(4 * len(quads)).reshape(-1, 4))
