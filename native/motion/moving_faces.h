@@ -23,6 +23,11 @@ namespace tolvol {
 /// In all calls `at(vertex)` is a box around all places where the vertex may be. Where it is another one than before,
 /// all faces of the vertex have to be changed before the next search.
 class MovingFaces {
+  /// For search(): no hub tells of any faces that they are apart. It is first, because its type is deduced.
+  static auto none_apart(const glm::dvec3&) {
+    return [](const Box&) { return false; };
+  }
+
  public:
   MovingFaces() = default;
   /// `faces` has `corners` indices, 3 or 4, for each face; keeps a reference to them. A face whose corners become
@@ -65,8 +70,8 @@ class MovingFaces {
   void for_each_near_elsewhere(std::uint32_t face, At&& at, Visit&& visit) const {
     search(Shared::left_out, none_apart, face, at, visit);
   }
-  /// As for_each_near(face, at, visit), for a triangle with these corners, where `at` has all hubs at points. Those around a hub that are apart
-  /// from it as seen from there are left out, too; so may be the face itself.
+  /// As for_each_near(face, at, visit), for a triangle with these corners, where `at` has all hubs at points. Those
+  /// around a hub that are apart from it as seen from there are left out, too; so may be the face itself.
   template <class At, class Visit>
   void for_each_near(std::uint32_t face, const Corners& corners, At&& at, Visit&& visit) const {
     const auto apart_from = [&](const glm::dvec3& hub) {
@@ -80,9 +85,6 @@ class MovingFaces {
   enum class Shared { looked_at, left_out };
   template <class Apart, class At, class Visit>
   void search(Shared shared, Apart&& apart_from, std::uint32_t face, At&& at, Visit&& visit) const;
-  static auto none_apart(const glm::dvec3&) {
-    return [](const Box&) { return false; };
-  }
 
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
