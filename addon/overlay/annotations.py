@@ -26,7 +26,9 @@ def end():
 
 def _draw(context):
     page = legend.Page(context)
-    taken = [*legend.adjusting(context), *(box for box in (legend.box(context.region),) if box)]
+    taken = legend.adjusting(context)
+    if box := legend.box(context.region):
+        taken.append(box)
     if context.space_data.overlay.show_overlays:
         if place := markers.draw(context, page, taken):
             taken.append(place)

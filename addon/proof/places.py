@@ -30,7 +30,8 @@ class Place:
     position: np.ndarray  # (3,) the point of the largest distance, in the world
     normal: np.ndarray  # (3,) of the surface there, away from the inside of a solid; it is 0 where the surface has none
     radius: float  # the distance of the farthest corner of the region from the position
-    area: float  # of the part of the region that is beyond the tolerance, in the world, as the legend estimates it
+    # Of the part of the region that is beyond the tolerance, in the world, as the legend estimates it; 0 if it is not known.
+    area: float
     faces: int  # the number of triangles of the region
 
 
@@ -45,15 +46,18 @@ def find(surface, reference, found, threads=None, progress=None):
         ways.append((True, reference, surface, found.backward))
     places, regions = [], 0
     for on_reference, own, other, largest in ways:
-        if largest.within(found.tolerance) and found.passed:
-            places += _near(on_reference, own, other, largest, found.tolerance, threads, progress)
-        elif not largest.within(found.tolerance):
+        if largest.within(found.tolerance):
+            if not found.passed:
+                continue
+            of_way = _near(on_reference, own, other, largest, found.tolerance, threads, progress)
+        else:
             triangles = certify.outside(own, other, largest, found.tolerance, threads, progress)
             beyond = _regions(own, np.flatnonzero(triangles))
             regions += len(beyond)
-            places += _measured(on_reference, own, other, largest, beyond, found.tolerance, threads, progress)
-    turned = {on_reference for on_reference, own, _, _ in ways if _is_turned(own, threads, progress)}
-    places = [replace(place, normal=-place.normal) if place.on_reference in turned else place for place in places]
+            of_way = _measured(on_reference, own, other, largest, beyond, found.tolerance, threads, progress)
+        if _is_turned(own, threads, progress):
+            of_way = [replace(place, normal=-place.normal) for place in of_way]
+        places += of_way
     return sorted(places, key=lambda place: -place.distance.upper), regions
 
 
@@ -98,24 +102,32 @@ def _measured(on_reference, own, other, largest, regions, tolerance, threads, pr
     distance = np.zeros(len(vertices))
     distance[corners] = _distances(other, vertices[corners], tolerance, threads, progress)
     regions = sorted(regions, key=lambda region: -distance[triangles[region]].max())
-    tree = native.module.DisplayTree(volumes.native_volume(other, tolerance, threads, progress), progress=progress)
+    tree = _tree(other, tolerance, threads, progress)
     places = []
     for region in regions[:MOST]:
         measured = largest
         if largest.triangle not in region:
             measured = measure.largest_distance((vertices, triangles[region]), target, None, threads, progress)
             measured = Interval(measured.lower, measured.upper, measured.position, int(region[measured.triangle]))
-        place = _place(on_reference, vertices, triangles, region, measured, True)
-        below, _, above = tree.shares(
-            own.arrays.vertices,
-            triangles[region],
-            [-tolerance, tolerance],
-            to_world=own.matrix,
-            threads=threads or None,
-            progress=progress,
-        )
-        places.append(replace(place, area=place.area * (below + above)))
+        share = 0.0
+        if tree is not None:
+            corners = vertices[triangles[region]].reshape(-1, 3)
+            each = np.arange(len(corners)).reshape(-1, 3)
+            below, _, above = tree.shares(
+                corners, each, [-tolerance, tolerance], threads=threads or None, progress=progress
+            )
+            share = below + above
+        places.append(_place(on_reference, vertices, triangles, region, measured, True, share))
     return places
+
+
+def _tree(other, tolerance, threads, progress):
+    """Returns what estimates areas by their distance from the Surface `other`, or None if that has too many triangles."""
+    volume = volumes.native_volume(other, tolerance, threads, progress)
+    try:
+        return native.module.DisplayTree(volume, progress=progress)
+    except native.module.InvalidInput:
+        return None
 
 
 def _near(on_reference, own, other, largest, tolerance, threads, progress):
@@ -154,7 +166,8 @@ def _distances(other, points, tolerance, threads, progress):
     return built.distance(points, threads=threads, progress=progress)
 
 
-def _place(on_reference, vertices, triangles, region, distance, beyond):
+def _place(on_reference, vertices, triangles, region, distance, beyond, share=0.0):
+    """Returns a Place. share: that of the region's area which is beyond the tolerance."""
     corners = vertices[triangles[region]]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
     a, b, c = vertices[triangles[distance.triangle]]
@@ -169,7 +182,7 @@ def _place(on_reference, vertices, triangles, region, distance, beyond):
         position,
         normal / length if length else normal,
         float(radius),
-        float(areas.sum()),
+        float(areas.sum() * share),
         len(region),
     )
 

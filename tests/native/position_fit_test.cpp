@@ -22,12 +22,20 @@ CertifiedMesh plate_lifted_by(double height, double share = 1) {
   return {reference, vertices, 0.2, {}, std::vector<double>(vertices.size(), share)};
 }
 
-TEST(PositionFit, BringsALiftedVertexBackToThePlane) {
-  const CertifiedMesh plate = plate_lifted_by(0.1);
-  Change change(*plate.mesh);
-  PositionFit fit(*plate.mesh);
+/// A fit of the lifted vertex, with a change prepared that leaves it where it is.
+struct LiftedFit {
+  explicit LiftedFit(double height, double share = 1) : plate(plate_lifted_by(height, share)) {
+    EXPECT_TRUE(change.prepare_relocate(kLifted, plate.mesh->vertex_position(kLifted)));
+  }
+  const CertifiedMesh plate;
+  Change change{*plate.mesh};
+  PositionFit fit{*plate.mesh};
   const dvec3 start = plate.mesh->position(kLifted);
-  ASSERT_TRUE(change.prepare_relocate(kLifted, plate.mesh->vertex_position(kLifted)));
+};
+
+TEST(PositionFit, BringsALiftedVertexBackToThePlane) {
+  LiftedFit lifted(0.1);
+  auto& [plate, change, fit, start] = lifted;
   fit.gather(change);
   const PositionFit::Fit first = fit.fit(change, start);
   const double height = 0.1 * plate.volume->frame().scale();
@@ -46,12 +54,9 @@ TEST(PositionFit, BringsALiftedVertexBackToThePlane) {
 
 TEST(PositionFit, ADeviationOfAFaceCountsByTheRootOfItsShare) {
   const auto deviation = [](double share) {
-    const CertifiedMesh plate = plate_lifted_by(0.1, share);
-    Change change(*plate.mesh);
-    PositionFit fit(*plate.mesh);
-    EXPECT_TRUE(change.prepare_relocate(kLifted, plate.mesh->vertex_position(kLifted)));
-    fit.gather(change);
-    return fit.fit(change, plate.mesh->position(kLifted)).deviation;
+    LiftedFit lifted(0.1, share);
+    lifted.fit.gather(lifted.change);
+    return lifted.fit.fit(lifted.change, lifted.start).deviation;
   };
   const double whole = deviation(1);
   EXPECT_NEAR(deviation(0.25), 2 * whole, 1e-9 * whole);
@@ -60,11 +65,8 @@ TEST(PositionFit, ADeviationOfAFaceCountsByTheRootOfItsShare) {
 
 // The tries at a vertex with very many faces are rationed by it.
 TEST(PositionFit, CountsThePointsThatItLooksAt) {
-  const CertifiedMesh plate = plate_lifted_by(0.1);
-  Change change(*plate.mesh);
-  PositionFit fit(*plate.mesh);
-  const dvec3 start = plate.mesh->position(kLifted);
-  ASSERT_TRUE(change.prepare_relocate(kLifted, plate.mesh->vertex_position(kLifted)));
+  LiftedFit lifted(0.1);
+  auto& [plate, change, fit, start] = lifted;
   EXPECT_EQ(fit.looked_at(), 0u);
   fit.fit(change, start);
   const std::size_t faces_alone = fit.looked_at();
@@ -78,11 +80,8 @@ TEST(PositionFit, CountsThePointsThatItLooksAt) {
 }
 
 TEST(PositionFit, StaysWhereNothingDeviates) {
-  const CertifiedMesh plate = plate_lifted_by(0);
-  Change change(*plate.mesh);
-  PositionFit fit(*plate.mesh);
-  const dvec3 start = plate.mesh->position(kLifted);
-  ASSERT_TRUE(change.prepare_relocate(kLifted, plate.mesh->vertex_position(kLifted)));
+  LiftedFit lifted(0);
+  auto& [plate, change, fit, start] = lifted;
   fit.gather(change);
   const PositionFit::Fit at_rest = fit.fit(change, start);
   EXPECT_LT(at_rest.energy, 1e-9);
