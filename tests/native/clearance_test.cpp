@@ -152,8 +152,8 @@ TEST(Clearance, AroundAHubAFaceIsComparedWithFew) {
   constexpr std::uint32_t kCount = 4000;
   TriangleMesh fan{{dvec3(0)}, {}};
   for (std::uint32_t i = 0; i < kCount; ++i) {
-    const double angle = 2 * std::numbers::pi * i / kCount, y = std::sin(angle);
-    fan.vertices.emplace_back(std::cos(angle), 0.8 * y, 0.6 * y);
+    const double angle = 2 * std::numbers::pi * i / kCount, radius = i % 2 == 0 ? 1 : 0.3, y = radius * std::sin(angle);
+    fan.vertices.emplace_back(radius * std::cos(angle), 0.8 * y, 0.6 * y);
     fan.triangles.emplace_back(0, 1 + i, 1 + (i + 1) % kCount);
   }
   Scene scene(fan);
