@@ -83,4 +83,5 @@ def status_line(told):
 
 
 def _duration(seconds):
-    return f"{seconds:.0f} s" if seconds < 60 else f"{seconds / 60:.0f} min"
+    # "0 s" would say that the work has ended.
+    return f"{max(round(seconds), 1)} s" if seconds < 59.5 else f"{seconds / 60:.0f} min"

@@ -7,6 +7,7 @@ import bmesh
 import bpy
 import numpy as np
 
+from ..shared import islands
 from ..shared.surface import MeshArrays
 
 
@@ -261,40 +262,10 @@ def loose_edges(mesh):
     return column(mesh.edges, "vertices", 2, np.int32)[loose]
 
 
-# UVs at one vertex that differ by less than this belong to one island: rounding makes them differ, as in Blender's own grid.
-# The number is for UVs up to 1, and is multiplied by larger ones.
-_SAME_UV = 2.0**-20
-
-
 def corner_uvs(mesh):
     """Returns (corners, 2 * layers) float32: the values of all UV maps, of which those at one vertex that differ only by
     rounding are made equal. They tell islands apart, and are not for writing. Returns None if there are no UV maps."""
     if not mesh.uv_layers:
         return None
     uvs = np.hstack([column(layer.data, "uv", 2) for layer in mesh.uv_layers])
-    vertices = column(mesh.loops, "vertex_index", 1, np.int32)
-    first = np.zeros(len(mesh.vertices), np.int64)
-    first[vertices[::-1]] = np.arange(len(vertices))[::-1]
-    several = np.zeros(len(mesh.vertices), bool)
-    several[vertices[(uvs != uvs[first[vertices]]).any(1)]] = True
-    corners = np.flatnonzero(several[vertices])
-    if len(corners):
-        for coordinate in range(uvs.shape[1]):
-            uvs[corners, coordinate] = _joined(vertices[corners], uvs[corners, coordinate])
-    return uvs
-
-
-def _joined(groups, values):
-    """Returns values. Those of a group that differ by less than _SAME_UV are made equal, and so are all of a chain of such.
-
-    groups: (n,) the group of each value; values: (n,) float32
-    """
-    order = np.lexsort((values, groups))
-    groups, values = groups[order], values[order]
-    begins = np.ones(len(order), bool)
-    with np.errstate(invalid="ignore"):  # A damaged file may hold any number.
-        near = np.diff(values) < _SAME_UV * np.maximum(1, np.abs(values[1:]))
-    begins[1:] = (np.diff(groups) != 0) | ~near
-    joined = np.empty_like(values)
-    joined[order] = values[np.maximum.accumulate(np.where(begins, np.arange(len(order)), 0))]
-    return joined
+    return islands.without_rounding(uvs, column(mesh.loops, "vertex_index", 1, np.int32))

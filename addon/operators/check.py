@@ -24,6 +24,7 @@ class Comparison(JobOperator):
     """Prepares both surfaces. The thread calls compare(surface, reference, tolerance, threads, progress)."""
 
     threads: threads_setting()
+    measures_again = False  # whether it measures even what was measured before in this session
 
     @classmethod
     def poll(cls, context):
@@ -42,7 +43,7 @@ class Comparison(JobOperator):
         """Returns the Verdict on a Surface, with the share of its area that is outside."""
         own = surface.world(), surface.arrays.triangles
         other = reference.world(), reference.arrays.triangles
-        ways = measure.both_ways(own, other, tolerance, threads, progress)
+        ways = measure.both_ways(own, other, tolerance, threads, progress, self.measures_again)
         found = Verdict(tolerance, *ways, two_sided=self.two_sided)
         if not found.forward_within:
             spread = native.module.deviation(*own, *other, bounds=(tolerance,), threads=threads, progress=progress)
@@ -68,6 +69,8 @@ the share of the mesh that is beyond the tolerance"""
     bl_idname = "tolvol.check"
     bl_label = "Check"
     bl_options = {"REGISTER"}
+
+    measures_again = True
 
     def compare(self, surface, reference, tolerance, threads, progress):
         return surface, self.judge(surface, reference, tolerance, threads, progress)

@@ -58,33 +58,29 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         if self.result == "SHAPE_KEY":
             raise Refused(f"{modifier.name} changes the faces of {ob.name}: choose Replace or New Object")
         name, trial = modifier.name, _Trial(ob, self.threads or preferences.threads(context))
-        parameter = trial.parameter(modifier)
+        # It comes before the search, so that Esc in the search does not leave it out.
+        self._plain = yield from self._of_decimate(context, trial)
+        parameter = trial.parameter(modifier, self._plain)
         with Evaluation(ob, name) as evaluation:
             # Adjust Last Operation passes the value that was found, or one that the user typed: no search is needed.
             if self.value:
                 found = [(0, self.value)]
             else:
-                found = yield from self._search(evaluation, parameter, trial, parameter.first)
+                found = yield from self._search(evaluation, parameter, trial, parameter.first, parameter.near)
             proved = yield from self._proved(evaluation, parameter, trial, found)
             if proved is None:
-                yield from self._refuse(context, name, parameter, trial)
+                yield from self._refuse(name, parameter, trial)
             self.value, mesh, certified = proved
-        try:
-            plain = None if self.progress.finishing else (yield from self._plain(context, trial))
-            settings = self.ob.tolvol.modifiers
-        except BaseException:
-            bpy.data.meshes.remove(mesh)
-            raise
-        shared.give(self, settings, modifier_settings())
+        shared.give(self, self.ob.tolvol.modifiers, modifier_settings())
         warnings, before = _crossing_warnings(name, certified["solidity"]), len(trial.surface.arrays.triangles)
         if trial.left > before:
             warnings.append(
                 f"{name} leaves {trial.left:,} triangles, more than the {before:,} that there were: undo it unless its new "
                 "faces are wanted"
             )
-        if plain is not None and plain < trial.left:
+        if self._plain is not None and self._plain < trial.left:
             warnings.append(
-                f"The button Decimate leaves fewer triangles within this tolerance: {plain:,}, and the modifier {name} "
+                f"The button Decimate leaves fewer triangles within this tolerance: {self._plain:,}, and the modifier {name} "
                 f"{trial.left:,}"
             )
         self._write(context, trial, mesh, certified, warnings)
@@ -95,14 +91,14 @@ ways, and apply the modifier to the base mesh. An object without a reference get
     def improving(self):
         return bool(self._found) and not self.progress.finishing
 
-    def _search(self, evaluation, parameter, trial, first):
+    def _search(self, evaluation, parameter, trial, first, near=None):
         """Returns (number of triangles, value) of values from `first` on at which no sample is beyond the tolerance and no more
         faces cross than may, the fewest triangles first. A value at which the modifier removes no triangle is left out unless
         it _counts()."""
         self._found = []
         name, triangles = evaluation.modifier.name, len(trial.surface.arrays.triangles)
         most, tried = fit.most_values(triangles), 0
-        search, deviation = fit.search(first, parameter.last, most), None
+        search, deviation = fit.search(first, parameter.last, most, near), None
         while not self.progress.finishing:
             try:
                 value = search.send(deviation)
@@ -120,18 +116,21 @@ ways, and apply the modifier to the base mesh. An object without a reference get
                 fewest = min(self._found)[0]
                 than = f", {triangles:,} before the fit" if fewest > triangles else ""
                 self.count = f"{fewest:,} triangles so far, not proved{than}"
-        return sorted(self._found)
+        found = sorted(self._found)
+        if self.progress.finishing:
+            return found
+        # If none of these is proved, values that are nearer to them than the first ones of the search are tried.
+        return [pair for pair in found if fit.close(pair[1], found[0][1])]
 
-    def _refuse(self, context, name, parameter, trial):
+    def _refuse(self, name, parameter, trial):
         """Raises Refused, because no value leaves fewer triangles within the tolerance."""
         ob, before = self.ob, len(trial.surface.arrays.triangles)
         why, remedy = "", "Take a larger tolerance"
         self.part, self.doing, self.share, self.count = f"Fitting {name}", "Comparing the quads", 0.0, ""
         if (yield trial.measured(mesh_io.both_triangulations(ob.data, trial.surface.arrays))) > 1:
             why = ": the modifier may cut bent quads along the other diagonal, which takes them beyond the tolerance"
-        plain = yield from self._plain(context, trial)
-        if plain is not None and plain < before:
-            remedy += f", or press Decimate, which leaves {plain:,}"
+        if self._plain is not None and self._plain < before:
+            remedy += f", or press Decimate, which leaves {self._plain:,}"
         if trial.crossed:
             remedy += ". At a value within the tolerance faces would cross, which Crossings can allow"
         raise Refused(
@@ -143,12 +142,11 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         """Returns (value, mesh, the result of certified()) for the first of the values whose mesh is proved to be within
         and, where crossings are kept out, has no more of them than before.
 
-        Samples may miss the largest deviation of all values that a search has found. Further searches then begin at values with
-        more triangles, in growing steps; after Esc only these values are tried. It returns None if no value is proved at which
-        the modifier, other than Remesh, removes a triangle.
+        Samples may miss the largest deviation of all values that a search has found. A second search then begins at the one of
+        them with the most triangles, and measures exactly. It returns None if no value is proved at which the modifier, other
+        than Remesh, removes a triangle.
         found: (number of triangles, or 0 if it is not known, value) of each, the one with the fewest triangles first.
         """
-        firsts = fit.further([value for _, value in found], parameter.last)
         while found:
             for triangles, value in found:
                 try:
@@ -160,9 +158,10 @@ ways, and apply the modifier to the base mesh. An object without a reference get
                 if self.value or self._counts(evaluation, trial, trial.left):
                     return proved
                 bpy.data.meshes.remove(proved[1])
-            if (first := next(firsts, None)) is None:
+            if trial.exact:
                 break
-            found = (yield from self._search(evaluation, parameter, trial, first)) or [(0, first)]
+            trial.exact = True
+            found = yield from self._search(evaluation, parameter, trial, found[-1][1])
         name, ob = evaluation.modifier.name, self.ob.name
         if self.progress.finishing:
             raise Refused(
@@ -196,8 +195,8 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         more than before."""
         return triangles < len(trial.surface.arrays.triangles) or evaluation.modifier.type == "REMESH"
 
-    def _plain(self, context, trial):
-        """Returns how many triangles Decimate would leave with its default settings."""
+    def _of_decimate(self, context, trial):
+        """Returns how many triangles Decimate would leave with its default settings, or None if it would be refused."""
         self.part, self.doing, self.share = "", "Comparing with Decimate", 0.0
         settings = self.ob.tolvol
         options = decimation.options(settings, automatic_placement(self.ob.data), trial.threads)
@@ -257,6 +256,7 @@ def _samples(vertices, triangles):
 class _Trial:
     """Compares meshes of one object with its reference. measured(), judged() and certified() return work for the thread.
 
+    exact: whether judged() decides like certified(), and not by samples alone.
     left: the number of triangles of the last mesh that was proved to be within the tolerance.
     crossed: whether a mesh that no sample proves to be beyond was refused because more faces would cross.
     """
@@ -268,14 +268,14 @@ class _Trial:
         self.tolerance = tolerances.required(ob, self.size)
         self.threads = threads
         self._pair = self.reference.world(), self.reference.arrays.triangles
-        self.left, self.crossed = 0, False
+        self.exact, self.left, self.crossed = False, 0, False
         self._keeps_crossings_out = ob.tolvol.crossings == "KEEP_OUT"
 
-    def parameter(self, modifier):
+    def parameter(self, modifier, plain):
         arrays = self.surface.arrays
         used = arrays.vertices[np.unique(arrays.triangles)]
         size = float(np.linalg.norm(used.max(0) - used.min(0)))
-        return fit.parameter(modifier, len(arrays.triangles), size, self.tolerance * size / self.surface.size())
+        return fit.parameter(modifier, len(arrays.triangles), size, self.tolerance * size / self.surface.size(), plain)
 
     def measured(self, arrays):
         """Returns work that gives the larger of the deviations both ways, in tolerances. It is above 1 if a sample proves that
@@ -302,6 +302,11 @@ class _Trial:
 
         def work(progress):
             deviation = self.measured(arrays)(progress)
+            if deviation <= 1 and self.exact:
+                pair = Surface(arrays, self.surface.matrix).world(), arrays.triangles
+                ways = measure.both_ways(pair, self._pair, self.tolerance, self.threads, progress)
+                if not all(way.within(self.tolerance) for way in ways):
+                    deviation = max(way.upper for way in ways) / self.tolerance
             if deviation > 1 or not self._keeps_crossings_out:
                 return deviation
             after = len(solidity.crossing_pairs(arrays, self.threads, progress))

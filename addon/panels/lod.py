@@ -4,6 +4,7 @@ import bpy
 from ..files.gltf_extras import GEOMETRIC_ERROR
 from ..mesh.mesh_io import triangle_count
 from ..operators.lod import chain, draw_lod_settings
+from ..proof import verdict
 from ..units import length
 from .layout import SubPanel, active, is_narrow, right
 
@@ -44,15 +45,24 @@ def _draw_level(context, column, made, i):
         name = level.name.removeprefix(f"{made[0].name}_")
         button.operator("tolvol.show_level", text=name, icon=icon, emboss=False).level = i
         triangles = f"{triangle_count(level.data):,}" if level.type == "MESH" else ""
-        error = level.get(GEOMETRIC_ERROR)
-        deviation = length(context, error) if isinstance(error, float) else "\u2013"
+        deviation = _deviation(context, level, i)
     else:
         row.label(text=f"LOD{i}", icon="HIDE_ON")
         triangles, deviation = "", "\u2013"
     if narrow:
         right(row, triangles)
-        if i:  # The object itself has no deviation.
-            right(column, deviation)
+        right(column, deviation)
     else:
         # Two labels would leave each other too little room.
         right(row, f"{triangles}  {deviation}")
+
+
+def _deviation(context, level, i):
+    """Returns the proved deviation as text. That of the object itself is known after a measurement."""
+    error = level.get(GEOMETRIC_ERROR)
+    if not i:
+        found = verdict.of(level) if level.type == "MESH" else None
+        error = found.largest if found else None
+        if found and verdict.negligible(found.largest, found.tolerance):
+            return "almost 0"
+    return length(context, error) if isinstance(error, float) else "\u2013"

@@ -49,6 +49,24 @@ def test_check_measures_both_ways_and_the_share_outside():
     assert verdict.of(ob).forward_within and verdict.of(ob).backward_within
 
 
+def test_only_check_measures_again_what_was_measured_before(monkeypatch):
+    ob = moved_up()
+    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.05
+    calls, measure = [], package.module.directed_hausdorff
+    monkeypatch.setattr(
+        package.module, "directed_hausdorff", lambda *args, **kw: (calls.append(kw), measure(*args, **kw))[1]
+    )
+    bpy.ops.tolvol.check()
+    whole = len(calls)
+    assert whole >= 2
+    for again in (bpy.ops.tolvol.measure_statistics, bpy.ops.tolvol.worst_point, bpy.ops.tolvol.select_outside):
+        again()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert len(calls) == whole
+    bpy.ops.tolvol.check()
+    assert len(calls) == 2 * whole
+
+
 def test_measurement_is_dropped_when_mesh_place_or_reference_change():
     other = torus("other")
     ob = torus()

@@ -11,6 +11,7 @@ from addon.job.progress_text import Told, stopping
 from addon.mesh.mesh_io import triangle_count
 from addon.panels import notes, progress
 from addon.panels.layout import AMBER, GHOST, GREEN, GREY, RED
+from addon.proof import verdict
 from addon.units import length
 from drawn import Layout, drawn, sidebar
 from scenes import sheet, torus
@@ -106,8 +107,20 @@ def test_the_levels_have_room_in_a_narrow_sidebar():
     wide, narrow = (names_of(panels.TOLVOL_PT_lod, width)[1] for width in (ENOUGH, NARROW))
     triangles = [f"{triangle_count(level.data):,}" for level in (ob, *ob.tolvol.lods.objects)]
     deviations = [length(bpy.context, level["geometricError"]) for level in ob.tolvol.lods.objects]
-    assert wide == [f"{triangles[0]}  \u2013", *map("  ".join, zip(triangles[1:], deviations))]
-    assert narrow == [triangles[0], *(text for pair in zip(triangles[1:], deviations) for text in pair)]
+    deviations.insert(0, "almost 0")  # The object is its own reference.
+    assert wide == [*map("  ".join, zip(triangles, deviations))]
+    assert narrow == [text for pair in zip(triangles, deviations) for text in pair]
+
+
+def test_the_object_of_levels_has_a_deviation_once_it_is_measured():
+    ob = torus()
+    assert bpy.ops.tolvol.make_lods() == {"FINISHED"}
+    ob.data.vertices[0].co.z += 0.25
+    ob.data.update()
+    bpy.context.view_layer.update()
+    assert names_of(panels.TOLVOL_PT_lod, ENOUGH)[1][0].endswith("  \u2013")
+    assert bpy.ops.tolvol.check() == {"FINISHED"}
+    assert names_of(panels.TOLVOL_PT_lod, ENOUGH)[1][0].endswith(f"  {length(bpy.context, verdict.of(ob).largest)}")
 
 
 # A job under way -----------------------------------------------------------------------------------------------------

@@ -176,6 +176,16 @@ def test_seams_of_uvs_stay_seams(tmp_path):
         assert len(mesh.vertices) < len(at.values)
 
 
+def test_uvs_that_differ_by_rounding_are_no_seam(tmp_path):
+    vertices, triangles, attributes = plate()
+    at = attributes["UVs"].values[attributes["UVs"].index].reshape(-1, 2)
+    noise = np.random.default_rng(1).uniform(-1, 1, at.shape) * 2e-7
+    own = Attribute(at + noise, np.arange(len(at)).reshape(-1, 3).astype(np.int32), True)
+    source = write(tmp_path / "in.obj", vertices, triangles, UVs=own)
+    succeeded(command("decimate", source, tmp_path / "out.obj", "--tolerance", "1%"))
+    assert len(read(tmp_path / "out.obj").triangles) < 100
+
+
 def test_what_is_left_out_is_said_on_one_line(tmp_path):
     vertices, triangles, attributes = plate()
     source = write(tmp_path / "in.ply", vertices, triangles, **attributes)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..shared import islands
 from ..shared.decimation import Task, hole_options
 from ..shared.errors import Refused
 from ..shared.files import file_check
@@ -98,7 +99,7 @@ def decimate(mesh, reference, tolerance, target, options, largest_perimeter):
     task = Task(mesh.name, surface_of(mesh), surface_of(reference), tolerance, asked)
     if "UVs" in mesh.attributes:
         uvs = mesh.attributes["UVs"]
-        task.uvs = uvs.values[uvs.index.ravel()]
+        task.uvs = islands.without_rounding(uvs.values[uvs.index.ravel()], mesh.triangles.ravel())
     if options.close_holes:
         task.close_holes = hole_options(largest_perimeter, options.max_normal_angle)
     arrays, _, result, run = followed(mesh.name, task.run)
