@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Finds the places where a mesh and its reference are farthest from each other, and keeps the ones that are shown.
 
-A place is a connected region of faces that are not proved to be within the tolerance. If there is none, the places are the
+A place is a connected region that is not proved to be within the tolerance (regions.py). If there is none, the places are the
 vertices whose distance is larger than that of their neighbours, and the point with the largest distance.
 """
 
@@ -14,6 +14,7 @@ from ..reference import measurements, snapshots, tolerances
 from ..shared import volumes
 from ..shared.proof import certify, measure
 from ..shared.proof.verdict import Interval
+from . import regions
 
 # So many places are measured in each direction; further regions are counted.
 MOST = 50
@@ -29,10 +30,10 @@ class Place:
     distance: Interval  # the largest distance in the region
     position: np.ndarray  # (3,) the point of the largest distance, in the world
     normal: np.ndarray  # (3,) of the surface there, away from the inside of a solid; it is 0 where the surface has none
-    radius: float  # the distance of the farthest corner of the region from the position
+    radius: float  # the distance of the farthest corner of the region's pieces from the position
     # Of the part of the region that is beyond the tolerance, in the world, as the legend estimates it; 0 if it is not known.
     area: float
-    faces: int  # the number of triangles of the region
+    faces: int  # the number of triangles that have a part in the region
 
 
 def find(surface, reference, found, threads=None, progress=None):
@@ -44,7 +45,7 @@ def find(surface, reference, found, threads=None, progress=None):
     ways = [(False, surface, reference, found.forward)]
     if found.two_sided:
         ways.append((True, reference, surface, found.backward))
-    places, regions = [], 0
+    places, count = [], 0
     for on_reference, own, other, largest in ways:
         if largest.within(found.tolerance):
             if not found.passed:
@@ -52,13 +53,14 @@ def find(surface, reference, found, threads=None, progress=None):
             of_way = _near(on_reference, own, other, largest, found.tolerance, threads, progress)
         else:
             triangles = certify.outside(own, other, largest, found.tolerance, threads, progress)
-            beyond = _regions(own, np.flatnonzero(triangles))
-            regions += len(beyond)
-            of_way = _measured(on_reference, own, other, largest, beyond, found.tolerance, threads, progress)
+            of_way, more = _beyond(
+                on_reference, own, other, largest, np.flatnonzero(triangles), found.tolerance, threads, progress
+            )
+            count += more
         if _is_turned(own, threads, progress):
             of_way = [replace(place, normal=-place.normal) for place in of_way]
         places += of_way
-    return sorted(places, key=lambda place: -place.distance.upper), regions
+    return sorted(places, key=lambda place: -place.distance.upper), count
 
 
 def _is_turned(surface, threads, progress):
@@ -72,53 +74,33 @@ def _is_turned(surface, threads, progress):
     return inwards != bool(np.linalg.det(surface.matrix[:3, :3]) < 0)
 
 
-def _regions(surface, chosen):
-    """Groups the triangles with the indices `chosen` by the corners that they share. Returns a list of index arrays.
-
-    Corners at the same position are the same: the triangles of some files have vertices of their own.
-    """
-    arrays = surface.arrays
-    _, corners = np.unique(arrays.vertices[arrays.triangles[chosen]].reshape(-1, 3), axis=0, return_inverse=True)
-    corners = corners.reshape(-1, 3)
-    labels = np.arange(corners.max(initial=-1) + 1)
-    while True:
-        lowest = labels[corners].min(1)
-        following = labels.copy()
-        np.minimum.at(following, corners.ravel(), np.repeat(lowest, 3))
-        following = following[following]
-        if np.array_equal(following, labels):
-            break
-        labels = following
-    order = np.argsort(labels[corners[:, 0]], kind="stable")
-    _, starts = np.unique(labels[corners[:, 0]][order], return_index=True)
-    return np.split(chosen[order], starts[1:])
-
-
-def _measured(on_reference, own, other, largest, regions, tolerance, threads, progress):
-    """Returns the Places of the MOST regions with the largest distances at their corners."""
+def _beyond(on_reference, own, other, largest, chosen, tolerance, threads, progress):
+    """Returns (the Places of the MOST Regions with the largest distances at their corners, the number of all Regions)."""
     vertices, triangles = own.world(), own.arrays.triangles
     target = other.world(), other.arrays.triangles
-    corners = np.unique(np.concatenate([triangles[region].ravel() for region in regions]))
-    distance = np.zeros(len(vertices))
-    distance[corners] = _distances(other, vertices[corners], tolerance, threads, progress)
-    regions = sorted(regions, key=lambda region: -distance[triangles[region]].max())
+
+    def distances(points):
+        return _distances(other, points, tolerance, threads, progress)
+
+    found, count = regions.find(vertices, triangles, chosen, largest, tolerance, distances, MOST)
     tree = _tree(other, tolerance, threads, progress)
     places = []
-    for region in regions[:MOST]:
-        measured = largest
-        if largest.triangle not in region:
-            measured = measure.largest_distance((vertices, triangles[region]), target, None, threads, progress)
-            measured = Interval(measured.lower, measured.upper, measured.position, int(region[measured.triangle]))
+    for region in found:
+        # The first one has the point of the largest distance.
+        measured, triangle = largest, largest.triangle
+        if places:
+            measured = measure.largest_distance((region.vertices, region.pieces), target, None, threads, progress)
+            triangle = region.triangles[measured.triangle]
         share = 0.0
         if tree is not None:
-            corners = vertices[triangles[region]].reshape(-1, 3)
-            each = np.arange(len(corners)).reshape(-1, 3)
             below, _, above = tree.shares(
-                corners, each, [-tolerance, tolerance], threads=threads or None, progress=progress
+                region.vertices, region.pieces, [-tolerance, tolerance], threads=threads or None, progress=progress
             )
             share = below + above
-        places.append(_place(on_reference, vertices, triangles, region, measured, True, share))
-    return places
+        of_region = region.vertices[region.pieces]
+        faces = len(np.unique(region.triangles))
+        places.append(_place(on_reference, vertices[triangles[triangle]], measured, of_region, faces, share))
+    return places, count
 
 
 def _tree(other, tolerance, threads, progress):
@@ -151,12 +133,14 @@ def _near(on_reference, own, other, largest, tolerance, threads, progress):
         native.module.pause(0.0)
     tops = np.flatnonzero(is_top)
     tops = tops[np.argsort(-rank[tops])][:_NEAREST]
-    places = [_place(on_reference, vertices, triangles, np.array([largest.triangle]), largest, False)]
+    corners = vertices[triangles[largest.triangle]]
+    places = [_place(on_reference, corners, largest, corners[None])]
     for top in tops.tolist():
         if distance[top] > 0 and top not in triangles[largest.triangle]:
             triangle = np.flatnonzero((triangles == top).any(1))[0]
             exact = Interval(distance[top], distance[top], tuple(vertices[top]), int(triangle))
-            places.append(_place(on_reference, vertices, triangles, np.array([triangle]), exact, False))
+            corners = vertices[triangles[triangle]]
+            places.append(_place(on_reference, corners, exact, corners[None]))
     return places
 
 
@@ -166,24 +150,27 @@ def _distances(other, points, tolerance, threads, progress):
     return built.distance(points, threads=threads, progress=progress)
 
 
-def _place(on_reference, vertices, triangles, region, distance, beyond, share=0.0):
-    """Returns a Place. share: that of the region's area which is beyond the tolerance."""
-    corners = vertices[triangles[region]]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    a, b, c = vertices[triangles[distance.triangle]]
+def _place(on_reference, corners, distance, pieces, beyond=0, share=0.0):
+    """Returns a Place.
+
+    corners: (3, 3) of the triangle with the largest distance; pieces: (k, 3, 3) the corners of all pieces of the region;
+    beyond: the number of triangles of a region that is beyond the tolerance; share: that of its area which is beyond.
+    """
+    areas = np.linalg.norm(np.cross(pieces[:, 1] - pieces[:, 0], pieces[:, 2] - pieces[:, 0]), axis=1) / 2
+    a, b, c = corners
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal)
     position = np.array(distance.position)
-    radius = np.linalg.norm(corners.reshape(-1, 3) - position, axis=1).max()
+    radius = np.linalg.norm(pieces.reshape(-1, 3) - position, axis=1).max()
     return Place(
         on_reference,
-        beyond,
+        beyond > 0,
         distance,
         position,
         normal / length if length else normal,
         float(radius),
         float(areas.sum() * share),
-        len(region),
+        beyond,
     )
 
 

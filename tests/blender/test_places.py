@@ -74,6 +74,31 @@ def test_the_view_shows_a_place_from_near_although_its_region_is_most_of_the_mes
     assert np.allclose(view.view_location, place.position)
 
 
+def test_on_one_large_face_the_parts_that_are_beyond_are_told_apart():
+    reference = sheet(bumps=0.0)
+    vertices, _ = sheet_arrays(bumps=0.0)
+    peaks = [int(np.abs(vertices[:, :2] - at).max(1).argmin()) for at in ((-0.5, -0.5), (0.5, 0.5), (0.4, -0.6))]
+    for peak, height in zip(peaks, (0.3, 0.2, 0.25)):
+        reference.data.vertices[peak].co.z = height
+    changed(reference)
+    low, high = vertices[:, :2].min(0), vertices[:, :2].max(0)
+    corners = [(*low, 0), (high[0], low[1], 0), (*high, 0), (low[0], high[1], 0)]
+    ob = add_object("large", corners, [(0, 1, 2, 3)])
+    ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", reference
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    assert bpy.ops.tolvol.worst_point() == {"FINISHED"}
+    found, _, count = places.shown(ob)
+    on_mesh = [place for place in found if not place.on_reference]
+    assert count == 6 and len(on_mesh) == 3 and all(place.faces <= 2 for place in on_mesh)
+    tops = np.array([reference.data.vertices[peak].co for peak in peaks])
+    for place in on_mesh:
+        assert place.position[2] == 0 and np.linalg.norm(tops[:, :2] - place.position[:2], axis=1).min() < 0.15
+        assert place.radius < 0.3
+    assert on_mesh[0].distance.upper == verdict.of(ob).forward.upper
+    heights = [place.distance.upper for place in found if place.on_reference]
+    assert np.allclose(heights, [0.3, 0.25, 0.2], rtol=2e-3)
+
+
 def test_one_way_leaves_the_reference_out():
     ob = peaked()
     ob.tolvol.keep = "ONE"
