@@ -109,7 +109,7 @@ def said(found):
     if found.kind == ONE_WAY:
         return f"{found.word}: the mesh is within the tolerance, but the reference is up to {largest} of the tolerance from it"
     if found.kind == BEYOND:
-        share = f"{100 * found.share_outside:.1f} % of the area is outside"
+        share = f"about {found.about_outside()} of the area is outside"
         return f"{found.word}: beyond the tolerance, up to {largest} of the tolerance, {share}"
     return f"{found.word}: {found.line()}"
 

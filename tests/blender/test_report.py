@@ -6,6 +6,7 @@ import io
 import json
 import os
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import bpy
@@ -16,6 +17,7 @@ from addon.mesh import mesh_io
 from addon.reference import snapshots
 from addon.shared.proof import deviation, deviation_table
 from addon.shared.proof.deviation_pictures import Picture
+from addon.shared.surface import Surface
 from commands import command, save
 from scenes import activate, add_object, sheet, sheet_arrays, torus, torus_arrays
 
@@ -102,10 +104,22 @@ def test_signed_where_the_other_surface_is_closed():
     assert edges[0] == -edges[-1] and shares[edges[:-1] >= 0].sum() == 0
 
 
+def test_page_has_no_digits_of_rounding_where_only_a_small_part_deviates():
+    a, _ = step()
+    vertices = a.arrays.vertices.copy()
+    vertices[0, 2] += 0.05
+    moved = Surface(replace(a.arrays, vertices=vertices), a.matrix)
+    page = Page(deviation.deviation_page.page(measured(moved, a, tolerance=0.1)))
+    assert "50 % of area withinalmost 0" in page.text and "Nothing deviates" not in page.text
+
+
 def test_surfaces_that_are_the_same():
     a, _ = step()
     run = measured(a, a, tolerance=0.01)
     assert run["forward"]["largest"][1] < 1e-12 and run["forward"]["beyond"][0]["share"] == 0
+    for each in (run, run | {"tolerance": None}):
+        page = Page(deviation.deviation_page.page(each))
+        assert page.text.count("Nothing deviates but by rounding") == 2 and "of area within" not in page.text
     assert "both are within the tolerance, proved" in deviation.deviation_page.page(run)
     assert "NaN" not in json.dumps(measured(a, a))
 

@@ -252,6 +252,7 @@ _OTHERS = {
         "addon/operators/fit_modifier.py",
         "largest > self.tolerance",
     ),  # where sampling ends; the proof decides afterwards
+    ("addon/proof/regions.py", "high > tolerance"),  # which pieces of faces that have failed make a region
     ("addon/estimate/curve.py", ""),  # the order of tolerances on a curve
     ("addon/shared/command/arguments.py", "tolerance > size"),  # an argument that makes no sense
     ("addon/shared/command/file_report.py", "left <= target"),  # numbers of triangles

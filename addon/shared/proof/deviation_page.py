@@ -14,7 +14,7 @@ from . import report, solidity
 from .deviation_drawings import LEAST_BAR, histogram, legend
 from .deviation_style import STYLE
 from .deviation_units import DIGITS, tolerance_text
-from .verdict import FAIL, NOT_CHECKED, PASS, Interval
+from .verdict import FAIL, NOT_CHECKED, PASS, Interval, negligible
 
 
 def page(document, pictures=()):
@@ -248,16 +248,29 @@ def _article(run, way, from_, to, highest, suffix):
     face = f"triangle {found['triangle']:,}" if found["face"] is None else f"face {found['face']:,}"
     whole = run["tolerance"]["absolute"] if run["tolerance"] else None
     relative = f", {_rounded(100 * upper / whole, True, 4)}&nbsp;% of the tolerance" if whole else ""
+    if _is_rounding(run, upper):
+        spread = f'<p class="muted">Nothing deviates but by rounding: {from_} lies on {to}.</p>'
+    else:
+        spread = f"""{_block("Statistics over the area", _statistics(run, found))}
+{_bands(run, found)}
+{_sides(run, found, to)}"""
     return f"""<article><h3>{from_} from {to}</h3>
 <p class="muted">Largest distance, proved to be at most</p>
 <p class="largest">{_rounded(upper, True)}{_unit(run)}</p>
 <p>{_rounded(100 * upper / run["size"], True, 4)}&nbsp;% of size{relative}; at least {_rounded(lower, False)}{_unit(run)}
 at ({place}), {face}.</p>
 {_block("Share of the area by distance", histogram(run, way, highest, f"{way}{suffix}", f"distance{_in_unit(run)}"))}
-{_block("Statistics over the area", _statistics(run, found))}
-{_bands(run, found)}
-{_sides(run, found, to)}
+{spread}
 </article>"""
+
+
+# Without a tolerance, what is a smaller share of the size is no more than rounding.
+_ROUNDING = 1e-10
+
+
+def _is_rounding(run, value):
+    """Whether the digits of a distance say nothing."""
+    return negligible(value, run["tolerance"]["absolute"]) if run["tolerance"] else value < _ROUNDING * run["size"]
 
 
 def _block(heading, content):
@@ -279,8 +292,13 @@ def _statistics(run, found):
     ]
     return _table(
         ("", f"distance{_in_unit(run)}", _of(run), "certainly"),
-        [(what, f"{value:.4g}", _relative(run, value), _between(ends)) for what, value, ends in rows],
+        [(what, *_estimated(run, value), _between(ends)) for what, value, ends in rows],
     )
+
+
+def _estimated(run, value):
+    """Returns an estimated distance as text, and its share of the tolerance or the size."""
+    return ("almost 0", "") if _is_rounding(run, value) else (f"{value:.4g}", _relative(run, value))
 
 
 def _bands(run, found):

@@ -148,8 +148,13 @@ class Verdict:
             return "Within the tolerance one way, proved: parts of the reference are farther from the mesh"
         if self.kind == UNDECIDED:
             return "Not proved: the distance differs from the tolerance by less than the rounding"
-        share = f": {100 * self.share_outside:.1f}{NO_BREAK}% of the mesh" if self.share_outside else ""
+        share = f": about {self.about_outside()} of the mesh" if self.share_outside else ""
         return f"Beyond the tolerance{share}"
+
+    def about_outside(self):
+        """Returns the share outside as text, with as many digits as two estimates of it have in common."""
+        percent = 100 * self.share_outside
+        return f"{percent:.0f}{NO_BREAK}%" if percent >= 1 else f"{percent:.1g}{NO_BREAK}%"
 
 
 # What is a smaller share of the tolerance is no more than rounding.
