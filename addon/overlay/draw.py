@@ -178,8 +178,7 @@ def _eye(view, world_to_frame):
 def legend_of_one(context, shown):
     """Draws the legend of the active object if that is in view, else of another object. Selected objects have one legend."""
     legend.forget_box(context.region)
-    quarters = context.space_data.region_quadviews
-    if quarters and context.region_data != quarters[-1]:
+    if not legend.belongs_here(context):
         return
     drawn, missing = _drawn(context, shown)
     objects = [*drawn, *missing]

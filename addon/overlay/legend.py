@@ -21,6 +21,8 @@ _BINS_WIDTH = 44
 _ROW, _BAND_ROW = 17, 15
 # There is so much space between the parts of the legend and around them, and between the legend and the edges of the view.
 _GAP, _MARGIN = 10, 14
+_LEAST_ROOM = 65  # in which the verdict has room in small letters
+_LEAST_MARGIN = 4  # around the verdict where it has hardly room
 # Stripes follow one another at this distance.
 _STRIPE = 12
 # The line with the verdict is so high, and the coloured square beside the verdict so wide.
@@ -165,17 +167,19 @@ def _draw_histogram(page, x, y, width, height, histogram):
 def _labels(context, colours, row):
     """Returns the labels of the bar as [(their height as a share of the bar, text)].
 
-    row: the height of a line as a share of the bar. The tolerance is marked where it is not at the end of the bar and has
-    room.
+    row: the height of a line as a share of the bar. The tolerance is marked where it is not at the end of the bar.
     """
     lowest, span = colours.lowest, colours.reach - colours.lowest
-    found = [(part, _label(context, lowest + part * span, colours.signed)) for part in (0, 0.5, 1)]
+    found = {part: _label(context, lowest + part * span, colours.signed) for part in (0, 0.5, 1)}
     if colours.coloured_beyond:
         for value in (-colours.tolerance, colours.tolerance) if colours.signed else (colours.tolerance,):
             part = (value - lowest) / span
-            if min(abs(part - other) for other, _ in found) >= row:
-                found.append((part, f"{_label(context, value, colours.signed)} (tolerance)"))
-    return found
+            text = f"{_label(context, value, colours.signed)} (tolerance)"
+            if not colours.signed and abs(part - 0.5) < row:
+                del found[0.5]  # The middle of a range means less than the tolerance.
+            # Beside the end of the range, or beside 0, the mark stands without its text.
+            found[part] = text if min(abs(part - other) for other in found) >= row else ""
+    return list(found.items())
 
 
 def _place(context, width, height, scale):
@@ -187,14 +191,17 @@ def _place(context, width, height, scale):
 
 
 def _draw_word(context, page, word):
-    """Draws the verdict alone where the legend has no room."""
-    gap, mark = _GAP * page.scale, _MARK * page.scale
-    width, height = page.width(word, _LARGE) + mark + 3 * gap, _WORD * page.scale
-    if place := _corner(context, width, height, _MARGIN * page.scale):
-        _paper(context, page, *place, width, height)
-        x, y = place[0] + gap, place[1] + height / 2
-        page.rectangle(x, y - mark / 2, mark, mark, shaders.FLAT, (*_COLOURS[word], 1))
-        page.text(x + mark + gap, y, word, points=_LARGE)
+    """Draws the verdict alone where the legend has no room: in large letters, or else in small ones."""
+    for points, margin in ((_LARGE, _MARGIN), (_POINTS, _LEAST_MARGIN)):
+        size = page.scale * points / _LARGE
+        gap, mark = _GAP * size, _MARK * size
+        width, height = page.width(word, points) + mark + 3 * gap, _WORD * size
+        if place := _corner(context, width, height, margin * size):
+            _paper(context, page, *place, width, height)
+            x, y = place[0] + gap, place[1] + height / 2
+            page.rectangle(x, y - mark / 2, mark, mark, shaders.FLAT, (*_COLOURS[word], 1))
+            page.text(x + mark + gap, y, word, points=points)
+            return
 
 
 def draw_note(context, text, word):
@@ -226,10 +233,11 @@ def percent(share):
     return f"{percent:.1f}{NO_BREAK}%"
 
 
-def free_part(context):
+def free_part(context, region=None):
     """Returns (left, right, bottom): the edges, in pixels of the region, of the part of the view that neither the toolbar, nor
-    the sidebar, nor a region at the bottom covers."""
-    region, left, right, bottom = context.region, 0, context.region.width, 0
+    the sidebar, nor a region at the bottom covers. region: that of the context if it is None."""
+    region = region or context.region
+    left, right, bottom = 0, region.width, 0
     for other in context.area.regions:
         if other == region or other.width <= 1 or other.height <= 1:
             continue
@@ -240,6 +248,18 @@ def free_part(context):
         elif other.alignment == "BOTTOM" and other.y <= region.y + bottom:
             bottom = max(bottom, other.y + other.height - region.y)
     return left, right, bottom
+
+
+def belongs_here(context):
+    """Whether the legend belongs into this region: a quad view has one legend, in its upper right quarter, or in another one
+    if the sidebar covers that."""
+    quarters = [region for region in context.area.regions if region.type == "WINDOW"]
+
+    def worth(region):
+        left, right, _ = free_part(context, region)
+        return min(right - left, _LEAST_ROOM * context.preferences.system.ui_scale), region.x + region.y
+
+    return context.region == max(quarters, key=worth)
 
 
 def adjusting(context):

@@ -75,23 +75,28 @@ class Box:
         return self.size[0] * self.size[1] > _MUCH * (right - left) * (context.region.height - low)
 
     def beside(self, context, x, y, away, others=()):
-        """Returns (left, bottom, width, height) beside a place, or else above or below it, in the free part of the view:
-        lower where it would lie over the others.
+        """Returns (left, bottom, width, height) at the right or the left of a place, or else above or below it, in the free
+        part of the view and not over the others; or at the first of these sides that has room, but lower.
 
         Returns None if there is no room for it. away: the distance from the place in pixels. others: (left, bottom, width,
         height) of boxes.
         """
         width, height = self.size
         least, right, low = legend.free_part(context)
-        if width > right - least or height > context.region.height - low:
+        high = context.region.height
+        if width > right - least or height > high - low:
             return None
-        left, bottom = x + away, y - height / 2
-        if left + width > right:
-            left = x - away - width
-        if left < least:
-            left = max(min(x - width / 2, right - width), least)
-            bottom = y + away if y + away + height <= context.region.height else y - away - height
-        bottom = min(max(bottom, low), context.region.height - height)
+        level, middle = y - height / 2, x - width / 2
+        beside = [(left, level) for left in (x + away, x - away - width) if least <= left <= right - width]
+        above = [(middle, bottom) for bottom in (y + away, y - away - height) if low <= bottom <= high - height]
+        places = [
+            (min(max(left, least), right - width), min(max(bottom, low), high - height), width, height)
+            for left, bottom in beside + above or [(middle, level)]
+        ]
+        free = [place for place in places if not any(overlap(place, other) for other in others)]
+        if free:
+            return free[0]
+        left, bottom, _, _ = places[0]
         while covered := [other for other in others if overlap((left, bottom, width, height), other)]:
             bottom = min(other[1] for other in covered) - height - self._page.scale
             if bottom < low:

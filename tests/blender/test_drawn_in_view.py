@@ -99,6 +99,21 @@ def test_a_note_without_room_is_the_word_alone(page):
     assert left >= 0 and left + width <= 220 and bottom >= 0
 
 
+def test_the_tolerance_is_marked_on_the_bar_whatever_lies_beside_it():
+    def labels_of(tolerance, signed):
+        return dict(legend._labels(bpy.context, Scale(tolerance, signed, 1.0, 0), 0.13))
+
+    for tolerance in (0.3, 0.45, 0.55, 0.8):
+        found = labels_of(tolerance, False)
+        assert found[tolerance].endswith(" (tolerance)")
+        assert (0.5 in found) == (abs(tolerance - 0.5) > 0.13)
+    # Beside an end there is no room for its text.
+    assert labels_of(0.95, False)[0.95] == labels_of(0.01, False)[0.01] == ""
+    found = labels_of(0.1, True)
+    assert found[0.55] == found[0.45] == "" and found[0.5] == "0"
+    assert labels_of(0.5, True)[0.75].startswith("+") and len(labels_of(1.0, False)) == 3
+
+
 # Labels --------------------------------------------------------------------------------------------------------------
 
 
@@ -106,13 +121,18 @@ def overlaps(boxes):
     return [(a, b) for i, a in enumerate(boxes) for b in boxes[:i] if markers.overlap(a, b)]
 
 
-def test_a_box_lies_lower_where_others_are_and_stays_in_the_view(page):
+def test_a_box_lies_beside_its_place_where_others_are_or_else_lower_and_stays_in_the_view(page):
     box = markers.Box(page, ["a line", "another line"])
     width, height = box.size
     assert box.beside(view(), 100, 300, 10) == (110, 300 - height / 2, width, height)
     assert box.beside(view(), 790, 300, 10)[0] == 780 - width
     assert box.beside(view(), 100, 599, 10)[1] == 600 - height and box.beside(view(), 100, 0, 10)[1] == 0
-    others = [(100, 290, 50, 20), (100, 290 - height, 500, 30), (0, 0, 50, 500)]
+    # One after another of the four sides is taken.
+    level, middle, others = 300 - height / 2, 400 - width / 2, []
+    for left, bottom in ((410, level), (390 - width, level), (middle, 310), (middle, 290 - height)):
+        assert box.beside(view(), 400, 300, 10, others) == (left, bottom, width, height)
+        others.append((left + width / 2, bottom + height / 2, 1, 1))
+    others = [(100, 290, 50, 400), (100, 290 - height, 500, 30), (0, 0, 50, 500)]
     placed = box.beside(view(), 100, 300, 10, others)
     assert placed[1] < 290 - height - height and not overlaps([placed, *others[:2]])
     assert box.beside(view(), 100, 300, 10, [(0, 5, 800, 500)]) is None
@@ -171,12 +191,13 @@ def test_labels_lie_neither_over_each_other_nor_over_the_legend_nor_over_the_wor
         assert bpy.ops.tolvol.add_label(position=(1.25, 0, 0.001 * i)) == {"FINISHED"}
     ob.tolvol.label_index = 5
     boxes, firsts = drawn_labels(page, monkeypatch, ob, (250, 20, 550, 100), (320, 185, 250, 40))
-    # The chosen label is whole and beside its place, and the others follow below the worst point while there is room.
-    assert "of the tolerance" in firsts[0] and [first.split(":")[0] for first in firsts] == ["6", "1", "2"]
-    assert boxes[0][1] == 250 - 21 and all(120 <= box[1] < 185 for box in boxes[1:])
+    # The chosen label is whole and beside its place, others are on its other sides, and some below the worst point.
+    assert "of the tolerance" in firsts[0] and len(firsts) > 5
+    assert [first.split(":")[0] for first in firsts] == [str(i) for i in (6, 1, 2, 3, 4, 5, 7, 8, 9)][: len(firsts)]
+    assert boxes[0][1] == 250 - 21 and boxes[1][0] + boxes[1][2] < 300 and any(120 <= box[1] < 185 for box in boxes)
     # Where the lines have no room, but the number has, it is drawn alone.
-    boxes, firsts = drawn_labels(page, monkeypatch, ob, (350, 0, 450, 600))
-    assert firsts[:4] == ["6", "1", "2", "3"] and all(box[0] + box[2] <= 350 for box in boxes)
+    boxes, firsts = drawn_labels(page, monkeypatch, ob, (340, 0, 460, 600), (0, 0, 270, 600))
+    assert firsts[:4] == ["6", "1", "2", "3"] and all(270 <= box[0] and box[0] + box[2] <= 340 for box in boxes)
 
 
 # Marks ---------------------------------------------------------------------------------------------------------------

@@ -185,6 +185,7 @@ def test_themes_widths_and_scales():
     legend._draw_word = lambda *arguments: drawn.append("word") or word(*arguments)
     legend.Page.rectangle = lambda page, x, y, width, height, *rest, **options: (
         (drawn.append("legend") if height > 120 * page.scale else None)
+        or (drawn.append("small word") if 14 < height / page.scale < 18 < width / page.scale else None)
         or whole(page, x, y, width, height, *rest, **options)
     )
     yield from press("tolvol.decimate")
@@ -221,7 +222,15 @@ def test_themes_widths_and_scales():
         view()[1].tag_redraw()
         yield from at_rest()
         screenshot("layout 8 twice as large")
-        assert set(drawn) == {"word"}
+        assert set(drawn) == {"word", "small word"}
+        with window_context():
+            bpy.ops.screen.region_quadview()
+        drawn.clear()
+        yield from at_rest()
+        screenshot("layout 9 quad view, twice as large")
+        assert "small word" in drawn
+        with window_context():
+            bpy.ops.screen.region_quadview()
     finally:
         bpy.context.preferences.view.ui_scale = 1
         legend.Page.rectangle, legend._draw_word = whole, word
