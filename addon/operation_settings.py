@@ -308,7 +308,7 @@ def lod_settings(options=frozenset(), in_length=None):
             size=MOST_LEVELS,
             default=(0.001, 0.005, 0.02, 0.04, 0.08, 0.16),
             min=1e-12,
-            precision=5,
+            precision=4,
             unit="LENGTH",
             options=set(options),
         ),

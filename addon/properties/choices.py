@@ -8,7 +8,7 @@ from .. import preferences
 
 # How a length above 0 is entered.
 # Blender 3.4 makes of this step one of a millimetre: for a pixel of dragging, or a click on an arrow.
-LENGTH = {"min": 1e-12, "soft_max": 1.0, "step": 0.01, "precision": 5, "subtype": "DISTANCE"}
+LENGTH = {"min": 1e-12, "soft_max": 1.0, "step": 0.01, "precision": 4, "subtype": "DISTANCE"}
 
 TOLERANCE_UNITS = (
     ("PERCENT", "% of Size", "Percent of the longest diagonal of the reference's bounding box"),
