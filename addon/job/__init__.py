@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs the long computations of operators in threads, with progress and Esc, while Blender can be used.
 
-An operator has three parts: prepare() reads Blender's data and returns the work; the work runs in the thread and touches
-no data of Blender; finish() writes the outcome in one go. An operator whose work needs Blender between its parts
+An operator has three parts: prepare() reads Blender's data, in parts, and returns the work; the work runs in the thread and
+touches no data of Blender; finish() writes the outcome in one go. An operator whose work needs Blender between its parts
 overrides steps(), a generator. For a script and in Blender without a window the same parts run one after the other, and
 the call returns when they are done.
 

@@ -13,7 +13,7 @@ from . import adjusting, progress_text, run
 from .interruptions import runs, under_way, undo_count
 
 # Blender draws nothing while a run takes its objects' meshes, which takes 0.05 to 0.1 s for this many faces together. For as many
-# or more, the operator first shows in the status bar that it has begun.
+# or more, the operator first shows in the status bar that it has begun, and reads the meshes in parts, between which it takes Esc.
 LARGE = 100_000
 
 _SOON = 0.02  # seconds, in which Blender draws the status bar
@@ -24,8 +24,8 @@ def _one_step(task):
 
 
 class JobOperator:
-    """A base class for an Operator with prepare(context), which returns work(progress), and finish(context, outcome),
-    which may return the operator's result, as steps() may."""
+    """A base class for an Operator with prepare(context), a generator that yields `breathe` between its parts and returns
+    work(progress), and finish(context, outcome), which may return the operator's result, as steps() may."""
 
     # Adjust Last Operation works on the same objects again, although another object may be active by then.
     worked_on: StringProperty(
@@ -68,7 +68,7 @@ class JobOperator:
         made its data anew meanwhile, so that the generator has to take the objects from self.objects after that. Where it
         works for long itself, it yields `breathe` from time to time. It returns the operator's result, or None for FINISHED:
         CANCELLED makes no undo step."""
-        outcome = yield self.prepare(context)
+        outcome = yield (yield from self.prepare(context))
         yield run.WRITE
         return self.finish(context, outcome)
 
@@ -120,7 +120,8 @@ class JobOperator:
         if self._has_to_wait():
             return {"CANCELLED"}
         if sum(len(ob.data.polygons) for ob in self.targets(context)) < LARGE:
-            started = self._start(context)
+            self._begin(context)
+            started = self._run.advance() or self._run.go_on(run.PATIENCE) or self._run.begin_modal(context)
             if started == {"RUNNING_MODAL"}:
                 context.window_manager.modal_handler_add(self)
             return started
@@ -141,11 +142,6 @@ class JobOperator:
         step was undone."""
         meshes = [(ob.name, ob.data.as_pointer(), len(ob.data.vertices)) for ob in self.targets(context)]
         return context.mode, undo_count(), meshes
-
-    def _start(self, context):
-        """Begins the run, which goes on by events if it takes longer than PATIENCE. Returns the result of an operator."""
-        self._begin(context)
-        return self._run.advance() or self._run.go_on(run.PATIENCE) or self._run.begin_modal(context)
 
     def modal(self, context, event):
         if self._waiting is None:
@@ -173,7 +169,8 @@ class JobOperator:
                 {"WARNING"}, f"{self.bl_label} did not begin, because something has changed since it was pressed"
             )
             return {"CANCELLED"}
-        return self._start(context)
+        self._begin(context)
+        return self._run.begin_modal(context)
 
     def cancel(self, context):
         """Called when Blender closes the window or the file, or a dialog of the operator before its job has begun."""

@@ -120,10 +120,14 @@ class Run:
     def go_on(self, seconds):
         """Does as many steps as the time permits. Returns the operator's result if it has ended, else None."""
         deadline = time.monotonic() + seconds
-        while (left := deadline - time.monotonic()) > 0 and self._job.done(left):
+        while (left := deadline - time.monotonic()) > 0 and self._ready(left):
             if ended := self.advance():
                 return ended
         return None
+
+    def _ready(self, seconds=0.0):
+        """Waits for the present job for at most so many seconds. Returns whether the next step can begin."""
+        return self._job is None or self._job.done(seconds)
 
     def begin_modal(self, context):
         """Goes on by the events that an operator, which is or becomes modal, passes to on_event() from now on."""
@@ -158,7 +162,7 @@ class Run:
         waits = context.mode != self._mode
         if not waits:
             try:
-                ended = self.go_on(_TICK) if self._job.done() else None
+                ended = self.go_on(_TICK) if self._ready() else None
             except BaseException:
                 self._leave(context)
                 raise
@@ -225,7 +229,7 @@ class Run:
 
     def _end(self):
         self.progress.cancel()
-        self._job.done(None)
+        self._ready(None)
         self._steps.close()
 
     def _next_work(self):
@@ -235,13 +239,12 @@ class Run:
         return self._last_part() if work is WRITE else work
 
     def _go_on_with_outcome(self):
-        if self._job is None:
-            return next(self._steps)
         try:
-            outcome = self._job.outcome()
+            outcome = None if self._job is None else self._job.outcome()
             if self.progress.cancelled:  # The work may have ended before it noticed the cancel.
                 raise native.module.Cancelled("cancelled")
-            if not self._breathes:  # That takes as long as a part between two breaths: _write() does it after them.
+            # That takes as long as a part between two breaths: _write() does it after them.
+            if self._job is not None and not self._breathes:
                 self._check()
         except BaseException as error:
             return self._steps.throw(error)

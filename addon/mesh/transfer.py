@@ -17,6 +17,10 @@ from .filling import add_faces
 from .mesh_io import column, edges_of_faces
 
 
+# Vertices are removed one by one, so many between two breaths: 0.1 s.
+_PIECE = 100_000
+
+
 class MeshMismatch(Refused):
     """Blender's mesh would differ from the computed one. Nothing was written."""
 
@@ -52,12 +56,14 @@ class Writing:
         """A generator: builds the scratch mesh and compares it with the result vertex by vertex and triangle by triangle.
         Raises MeshMismatch if they differ.
 
-        It yields between its parts, each of which takes about 0.1 s for 300,000 triangles. The mesh must stay as it is.
+        It yields between its parts, each of which takes at most about 0.1 s for 300,000 triangles: Blender takes so long to make
+        the scratch mesh. The mesh must stay as it is.
         """
         mesh, source, result, built = self._mesh, self._source, self._result, self._built
         self._carry = Carry(mesh, source, result)
         yield
         built.from_mesh(mesh)
+        yield
         loose = _loose(mesh, built)
         if isinstance(source, FilledArrays):
             add_faces(built, mesh, source)
@@ -68,7 +74,8 @@ class Writing:
         self._carry.blend_groups(built)
         verts = built.verts[:]
         targets = _weld_targets(result)
-        faces, present = _keep_faces(built, verts, source, result.triangle_source, targets)
+        yield
+        faces, present = yield from _keep_faces(built, verts, source, result.triangle_source, targets)
         yield
         _turn(built, verts, faces, result)
         _weld(built, verts, present, targets, loose)
@@ -145,7 +152,8 @@ def _only_triangles(source):
 
 
 def _keep_faces(built, verts, source, kept, targets):
-    """Deletes all faces except the triangles `kept` of the source, and vertices that only deleted faces use.
+    """A generator like Writing.prepare(): deletes all faces except the triangles `kept` of the source, and vertices that only
+    deleted faces use.
 
     Returns the faces of these triangles, and (n,) bool: the vertices of the source that are there still.
     """
@@ -163,8 +171,11 @@ def _keep_faces(built, verts, source, kept, targets):
     present = _stays(targets)
     present[source.triangles[kept]] = True
     # To remove a vertex with its faces takes a fraction of the time that it takes to delete these and to merge it.
-    for vertex in np.flatnonzero(~present).tolist():
-        built.verts.remove(verts[vertex])
+    gone = np.flatnonzero(~present).tolist()
+    for begin in range(0, len(gone), _PIECE):
+        for vertex in gone[begin : begin + _PIECE]:
+            built.verts.remove(verts[vertex])
+        yield
     stays = set(faces)
     bmesh.ops.delete(built, geom=[face for face in built.faces if face not in stays], context="FACES_ONLY")
     return faces, present

@@ -42,7 +42,7 @@ moves as far as the tolerance permits. An object without a reference gets one fi
     def steps(self, context):
         context.view_layer.update()
         ob, name = self.ob, self.chosen(fitted=False).name
-        motion = Motion(ob, self.threads or preferences.threads(context))
+        motion = yield from Motion.of(ob, self.threads or preferences.threads(context))
         with Evaluation(ob, name) as evaluation:
             mesh = evaluation.mesh()
             if not same_faces(mesh, ob.data):

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from .. import native, preferences
-from ..job import JobOperator
+from ..job import JobOperator, breathe
 from ..mesh import mesh_io
 from ..operation_settings import threads_setting
 from ..proof import statistics, verdict
@@ -33,7 +33,10 @@ class Comparison(JobOperator):
     def prepare(self, context):
         context.view_layer.update()
         ob = self.ob
-        surface, reference = snapshots.surface_of(ob), snapshots.reference_of(ob)
+        surface = snapshots.surface_of(ob)
+        yield breathe
+        reference = snapshots.reference_of(ob)
+        yield breathe
         tolerance = tolerances.required(ob, reference.size())
         threads = self.threads or preferences.threads(context)
         self.two_sided = ob.tolvol.keep == "BOTH"

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from .. import preferences
-from ..job import JobOperator
+from ..job import JobOperator, breathe
 from ..mesh import mesh_io
 from ..operation_settings import threads_setting
 from ..reference import snapshots
@@ -36,6 +36,7 @@ corners and edges that they share"""
 
     def prepare(self, context):
         context.view_layer.update()
+        yield breathe
         threads = self.threads or preferences.threads(context)
         return functools.partial(self.find, snapshots.surface_of(self.ob).arrays, threads)
 

@@ -7,7 +7,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from .. import preferences
-from ..job import WRITE, JobOperator
+from ..job import WRITE, JobOperator, breathe
 from ..mesh import transfer
 from ..operation_settings import PROTECTED, decimate_settings, threads_setting
 from ..proof import verdict
@@ -120,7 +120,7 @@ object. An object without a reference gets one first, as by Set Reference"""
         for ob in self.objects:
             if reason := decimate_blocked(ob):
                 raise Refused(f"{ob.name}: {reason}")
-            tasks.append(self._task(context, ob))
+            tasks.append((yield from self._task(context, ob)))
         # The tolerance is stored in the other unit too, so that changing the unit in Adjust Last Operation keeps it.
         other = "PERCENT" if self.tolerance_mode == "LENGTH" else "LENGTH"
         tolerances.convert_tolerance(self, tasks[0].reference.size(), other)
@@ -132,8 +132,11 @@ object. An object without a reference gets one first, as by Set Reference"""
             self.finish(outcomes, writes)
 
     def _task(self, context, ob):
+        """A generator for steps(): returns the Task of an object."""
         surface = snapshots.surface_of(ob)
+        yield breathe
         reference = snapshots.reference_of(ob, surface)
+        yield breathe
         tolerance = tolerances.tolerance_length(self, reference.size())
         placement = automatic_placement(ob.data) if self.own_placements else self.placement
         options = decimation.options(self, placement, self.threads or preferences.threads(context))

@@ -60,7 +60,7 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
         self.lattice = cage.name
         if not self.properties.is_property_set("mode"):
             self.mode = ob.tolvol.deform_mode
-        motion = Motion(ob, self.threads or preferences.threads(context))
+        motion = yield from Motion.of(ob, self.threads or preferences.threads(context))
         lattice, mode = native_lattice(cage), self.mode.lower()
 
         def deform(faces, progress):

@@ -6,6 +6,7 @@ import numpy as np
 from bpy.props import FloatProperty, StringProperty
 
 from .. import native, preferences
+from ..job import breathe
 from ..mesh import mesh_io
 from ..mesh.evaluation import Evaluation
 from ..operation_settings import modifier_settings, threads_setting
@@ -57,7 +58,11 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         ob, modifier = self.ob, self.chosen(fitted=True)
         if self.result == "SHAPE_KEY":
             raise Refused(f"{modifier.name} changes the faces of {ob.name}: choose Replace or New Object")
-        name, trial = modifier.name, _Trial(ob, self.threads or preferences.threads(context))
+        surface = snapshots.surface_of(ob)
+        yield breathe
+        reference = snapshots.reference_of(ob, surface)
+        yield breathe
+        name, trial = modifier.name, _Trial(ob, surface, reference, self.threads or preferences.threads(context))
         # It comes before the search, so that Esc in the search does not leave it out.
         self._plain = yield from self._of_decimate(context, trial)
         parameter = trial.parameter(modifier, self._plain)
@@ -261,9 +266,8 @@ class _Trial:
     crossed: whether a mesh that no sample proves to be beyond was refused because more faces would cross.
     """
 
-    def __init__(self, ob, threads):
-        self.surface = snapshots.surface_of(ob)
-        self.reference = snapshots.reference_of(ob)
+    def __init__(self, ob, surface, reference, threads):
+        self.surface, self.reference = surface, reference
         self.size = self.reference.size()
         self.tolerance = tolerances.required(ob, self.size)
         self.threads = threads

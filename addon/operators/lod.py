@@ -10,7 +10,7 @@ from bpy.props import IntProperty
 
 from .. import preferences
 from ..files.gltf_extras import GEOMETRIC_ERROR
-from ..job import WRITE, JobOperator
+from ..job import WRITE, JobOperator, breathe
 from ..mesh import transfer
 from ..operation_settings import lod_settings, threads_setting
 from ..proof import verdict
@@ -76,15 +76,17 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
         context.view_layer.update()
         shared.take(self, self.ob.tolvol.lod, lod_settings())
         names = [(f"Level {i + 1} of {self.levels}", f"Level {i + 1}") for i in range(self.levels)]
-        outcomes = yield from self.each(self._tasks(context), names)
+        outcomes = yield from self.each((yield from self._tasks(context)), names)
         with contextlib.ExitStack() as stack:
             writes = yield from decimation.prepared(self, stack, lambda: self._writes(outcomes))
             yield WRITE
             self._write(context, outcomes, writes)
 
     def _tasks(self, context):
+        """A generator for steps(): returns the Task of each level."""
         ob = self.ob
         reference = snapshots.reference_of(ob)
+        yield breathe
         limits = self._limits(context, reference.size())
         if self.by == "TOLERANCE":  # Choosing the other unit in Adjust Last Operation then keeps the tolerances.
             tolerances.convert_levels(self, reference.size(), "PERCENT" if self.in_length else "LENGTH")
@@ -94,8 +96,10 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             placement = settings.placement if chosen else automatic_placement(original.data)
             asked = decimation.options(settings, placement, self.threads or preferences.threads(context))
             asked |= {"two_sided": True, "target_triangles": None, "outside": "error"}
-            surface = snapshots.surface_of(original)
-            tasks = [decimation.task(original, surface, reference, limit, settings, dict(asked)) for limit in limits]
+            surface, tasks = snapshots.surface_of(original), []
+            for limit in limits:
+                yield breathe
+                tasks.append(decimation.task(original, surface, reference, limit, settings, dict(asked)))
         if self.by == "COUNT":
             triangles = len(tasks[0].surface.arrays.triangles)
             for i, (task, count) in enumerate(zip(tasks, self.counts)):

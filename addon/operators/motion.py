@@ -8,6 +8,7 @@ import bmesh
 import numpy as np
 
 from .. import native
+from ..job import breathe
 from ..mesh import mesh_io
 from ..proof import last_run
 from ..reference import measurements, snapshots, tolerances
@@ -29,15 +30,25 @@ _MOST_TRIES = 8
 class Motion:
     """The main thread makes it and calls settle() and write(). The thread of the job calls volume(), hold() and certify()."""
 
-    def __init__(self, ob, threads):
+    @classmethod
+    def of(cls, ob, threads):
+        """A generator for an operator's steps(): reads the mesh of an object and its reference, and returns the Motion."""
         ob.update_from_editmode()
-        self.surface = snapshots.surface_of(ob)
-        self.reference = snapshots.reference_of(ob)
+        surface = snapshots.surface_of(ob)
+        yield breathe
+        reference = snapshots.reference_of(ob, surface)
+        yield breathe
+        return cls(ob, surface, reference, threads)
+
+    def __init__(self, ob, surface, reference, threads):
+        self.surface, self.reference = surface, reference
         self.size = self.reference.size()
         self.tolerance = tolerances.required(ob, self.size)
         self.two_sided = ob.tolvol.keep == "BOTH"
         self.crossings = ob.tolvol.crossings.lower()
-        self.faces, _ = mesh_io.Polygons.of(ob.data).whole_quads(self.surface.arrays.triangles)
+        self.faces = self.surface.arrays.triangles
+        if len(ob.data.polygons) < len(self.faces):
+            self.faces, _ = mesh_io.Polygons.of(ob.data).whole_quads(self.faces)
         self.threads = threads
         self.warnings = []  # of hold()
         self._mesh = ob.data

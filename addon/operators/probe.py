@@ -9,7 +9,7 @@ from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_
 
 from .. import native, preferences, status_bar
 from ..background import Job
-from ..job import JobOperator
+from ..job import JobOperator, breathe
 from ..operation_settings import threads_setting
 from ..proof import labels, probing
 from ..reference import measurements, snapshots, tolerances
@@ -231,7 +231,10 @@ class _Measuring(JobOperator):
 
     def prepare(self, context):
         context.view_layer.update()
-        sources = [probing.Source(self.ob, on_reference) for on_reference in self.surfaces()]
+        sources = []
+        for on_reference in self.surfaces():
+            sources.append(probing.Source(self.ob, on_reference))
+            yield breathe
         threads = self.threads or preferences.threads(context)
 
         def work(progress):

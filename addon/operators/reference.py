@@ -6,9 +6,10 @@ import numpy as np
 from bpy.props import BoolProperty
 
 from .. import preferences
-from ..job import JobOperator
+from ..job import JobOperator, breathe
+from ..mesh import mesh_io
 from ..operation_settings import threads_setting
-from ..reference import originals, snapshots, tolerances
+from ..reference import measurements, originals, snapshots, tolerances
 from ..shared import volumes
 from .asking import ask
 from .blocked import allowed, reference_blocked, settings_blocked
@@ -29,12 +30,12 @@ def loses_something(ob):
     source = snapshots.source_object(ob)
     if source is None or source.type != "MESH":
         return True
+    places = mesh_io.matrix_array(source.matrix_world), snapshots.reference_matrix(ob)
+    if not np.array_equal(*(place.astype(np.float32) for place in places)):
+        return True
     source.update_from_editmode()
-    surface = snapshots.surface_of(source)
-    same_place = (
-        surface.matrix.astype(np.float32).tobytes() == snapshots.reference_matrix(ob).astype(np.float32).tobytes()
-    )
-    if not same_place or surface.arrays.fingerprint() != ob.tolvol.snapshot_fingerprint:
+    # The panel mostly knows the fingerprint: to read a large mesh would take longer than a person waits.
+    if measurements.shown_fingerprint(source) != ob.tolvol.snapshot_fingerprint:
         return True
     original = ob.tolvol.original
     return original is not None and not originals.same_data(source.data, original)
@@ -84,6 +85,7 @@ the original with its UV maps, materials and other data. If these differ from th
         context.view_layer.update()
         ob = self.ob
         surface = snapshots.surface_of(snapshots.source_object(ob))
+        yield breathe
         tolerance = tolerances.tolerance_length(ob.tolvol, surface.size())
         threads = self.threads or preferences.threads(context)
 

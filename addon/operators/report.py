@@ -10,7 +10,8 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from .. import native, preferences
-from ..job import JobOperator
+from ..job import JobOperator, breathe
+from ..mesh.mesh_io import triangle_count
 from ..operation_settings import threads_setting
 from ..proof import labels, last_run
 from ..reference import measurements, snapshots, tolerances
@@ -162,7 +163,9 @@ a table (.csv) or all numbers (.json)"""
         self._prepare_file()
         blocked = {ob.name: reason for ob in self.objects if (reason := check_blocked(ob))}
         measured = [ob for ob in self.objects if ob.name not in blocked]
-        tasks = [self._task(context, ob) for ob in measured]
+        tasks = []
+        for ob in measured:
+            tasks.append((yield from self._task(context, ob)))
         about = {
             "date": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
             "blend_file": Path(bpy.data.filepath).name or None,
@@ -196,8 +199,12 @@ a table (.csv) or all numbers (.json)"""
                 staged.folder(self._target)
 
     def _task(self, context, ob):
+        """A generator for steps(): returns the _Task of an object."""
         settings = ob.tolvol
-        surface, reference = snapshots.surface_of(ob), snapshots.reference_of(ob)
+        surface = snapshots.surface_of(ob)
+        yield breathe
+        reference = snapshots.reference_of(ob)
+        yield breathe
         size = reference.size()
         tolerance = tolerances.required(ob, size)
         of_object = settings.snapshot_kind == "OBJECT" and settings.snapshot_object is not None
@@ -227,5 +234,4 @@ def _ending(format_):
 
 
 def _counted(name, mesh):
-    mesh.calc_loop_triangles()
-    return {"name": name, "vertices": len(mesh.vertices), "triangles": len(mesh.loop_triangles)}
+    return {"name": name, "vertices": len(mesh.vertices), "triangles": triangle_count(mesh)}

@@ -56,18 +56,21 @@ of all edited meshes. An object without a reference gets one first, as by Set Re
         chosen = [i for i, ob in enumerate(self.objects) if _anything_to_smooth(ob)]
         if not chosen:
             raise Refused(f"No vertex of {_names(self.objects)} is selected")
-        tasks = [self._task(context, self.objects[i]) for i in chosen]
+        tasks = []
+        for i in chosen:
+            tasks.append((yield from self._task(context, self.objects[i])))
         outcomes = yield from self.each(tasks, steps=_Task.steps)
         yield WRITE
         self.finish([self.objects[i] for i in chosen], outcomes)
 
     def _task(self, context, ob):
+        """A generator for steps(): returns the _Task of an object."""
         if reason := decimate_blocked(ob, _MODES):
             raise Refused(f"{ob.name}: {reason}")
         if ob.mode == "EDIT" and ob.active_shape_key_index > 0:
             basis = ob.data.shape_keys.reference_key.name
             raise Refused(f"Smoothing changes the base mesh of {ob.name}: choose the shape key {basis} first")
-        motion = Motion(ob, self.threads or preferences.threads(context))
+        motion = yield from Motion.of(ob, self.threads or preferences.threads(context))
         locked = np.zeros(len(motion.before), bool)
         locked[mesh_io.loose_edges(ob.data)] = True
         if ob.mode == "EDIT":

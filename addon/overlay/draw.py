@@ -89,7 +89,7 @@ def surfaces(context, shown):
     drawn, _ = _drawn(context, shown)
     if not drawn:
         return
-    # NEARER may let two layers pass the depth test at one pixel. Writing depths makes the nearer layer visible.
+    # Of two objects at one pixel, the nearer one is visible.
     gpu.state.depth_mask_set(True)
     references = [ob for ob in drawn if coloured.is_reference(ob)]
     try:
@@ -126,15 +126,10 @@ def _draw(context, ob, drawn):
     gpu.state.blend_set("ALPHA")
     shader = shaders.surface()
     shader.bind()
-    shader.uniform_sampler("colours", buffer.colours)
+    for name in ("colours", "depths"):
+        shader.uniform_sampler(name, getattr(buffer, name))
     shader.uniform_block("told", told)
-    if x_ray or coloured.is_reference(ob):
-        # The depth buffer is empty, or was cleared. A first pass writes the depths, so that the second draws only the
-        # nearest layer.
-        gpu.state.color_mask_set(False, False, False, False)
-        what.triangles.draw(shader, what.to_frame)
-        gpu.state.color_mask_set(True, True, True, True)
-    what.triangles.draw(shader, what.to_frame)
+    square.unit().draw(shader)
     if ob.mode == "EDIT" and not x_ray and not coloured.is_reference(ob):
         # The coloured surface covers Blender's edges but not its vertices, so the edges are drawn again.
         theme = context.preferences.themes[0].view_3d

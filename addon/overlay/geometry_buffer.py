@@ -3,7 +3,7 @@
 
 The distance of a place takes long to find. For a triangle that is smaller than a pixel the GPU would find it for a whole block of
 pixels, and keep one of them. So the triangles of an object are drawn without distances, and then each of its pixels gets its
-colour once. At last the triangles are drawn with these colours, where Blender's depths show them. This is deferred shading
+colour once. At last the pixels are drawn where Blender's depths show them. This is deferred shading
 [M. Deering et al., "The Triangle Processor and Normal Vector Shader", 1988].
 """
 
@@ -21,7 +21,7 @@ class GeometryBuffer:
     (`places`), and its colour (`colours`). 28 bytes a pixel."""
 
     places: gpu.types.GPUTexture
-    depths: gpu.types.GPUTexture  # A framebuffer does not keep its textures.
+    depths: gpu.types.GPUTexture
     colours: gpu.types.GPUTexture
     of_places: gpu.types.GPUFrameBuffer
     of_colours: gpu.types.GPUFrameBuffer

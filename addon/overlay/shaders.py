@@ -89,8 +89,10 @@ void main() {
 
 _SURFACE_FRAGMENT = """
 void main() {
-  vec4 colour = texelFetch(colours, ivec2(gl_FragCoord.xy), 0);
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec4 colour = texelFetch(colours, pixel, 0);
   if (colour.a == 0.0) discard;
+  gl_FragDepth = texelFetch(depths, pixel, 0).r;
   shown = displayed(colour.rgb, told.opacity);
 }
 """
@@ -165,14 +167,6 @@ def _info(varying, attributes, vertex, fragment, shared=()):
     return info
 
 
-def _of_surface(fragment, shared=()):
-    """Returns the GPUShaderCreateInfo of a shader that draws the triangles of a surface."""
-    info = _info(("VEC3", "place"), _VERTEX, _SURFACE_VERTEX, fragment, shared)
-    _add_told(info)
-    info.define("NEARER", "1e-6")
-    return info
-
-
 def _add_told(info):
     """Adds the uniform block `told`, to which the result of told() has to be bound."""
     info.typedef_source(_SURFACE_TOLD)
@@ -182,7 +176,10 @@ def _add_told(info):
 @functools.cache
 def geometry():
     """Returns the shader that draws the triangles of a surface into the places of a geometry buffer."""
-    return gpu.shader.create_from_info(_of_surface(_GEOMETRY_FRAGMENT, ("distance_colour.glsl",)))
+    info = _info(("VEC3", "place"), _VERTEX, _SURFACE_VERTEX, _GEOMETRY_FRAGMENT, ("distance_colour.glsl",))
+    _add_told(info)
+    info.define("NEARER", "1e-6")
+    return gpu.shader.create_from_info(info)
 
 
 @functools.cache
@@ -205,9 +202,13 @@ def colours():
 
 @functools.cache
 def surface():
-    """Returns the shader that draws the triangles of a surface with the texture `colours` of a geometry buffer."""
-    info = _of_surface(_SURFACE_FRAGMENT)
-    info.sampler(0, "FLOAT_2D", "colours")
+    """Returns the shader that draws the pixels of a surface, which are in the textures `colours` and `depths` of a geometry
+    buffer. To draw the triangles of a large mesh once more would take about as long as Blender's own drawing."""
+    info = _info(("VEC2", "part"), [("VEC2", "position")], _VIEW_VERTEX, _SURFACE_FRAGMENT)
+    for i, name in enumerate(("colours", "depths")):
+        info.sampler(i, "FLOAT_2D", name)
+    _add_told(info)
+    info.depth_write("ANY")
     return gpu.shader.create_from_info(info)
 
 

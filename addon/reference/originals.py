@@ -40,15 +40,29 @@ def data_names(mesh):
         "materials": mesh.materials,
         "shape keys": mesh.shape_keys,
         "custom normals": mesh.has_custom_normals,
-        "vertex groups": any(vertex.groups for vertex in mesh.vertices),
+        "vertex groups": _has_weights(mesh),
     }
     return [name for name, present in layers.items() if present]
+
+
+def _has_weights(mesh):
+    return any(vertex.groups for vertex in mesh.vertices)
 
 
 def with_its_data(mesh):
     """Returns the end of a sentence about a mesh: what data it has, or "" if it has none but its faces."""
     kept = ", ".join(data_names(mesh))
     return f", with its {kept}" if kept else ""
+
+
+def is_bare(mesh, arrays):
+    """Whether a mesh has the faces that `arrays` has as triangles, and none of the data that data_names() names, and no attributes.
+    Marks and flags do not count."""
+    if len(mesh.polygons) != len(arrays.triangles) or data_names(mesh):
+        return False
+    if any(carry.attributes(mesh, domain) for domain in ("POINT", "EDGE", "FACE", "CORNER")):
+        return False
+    return column(mesh.loops, "vertex_index", 1, np.int32).tobytes() == arrays.triangles.tobytes()
 
 
 def _uv_maps(mesh):
@@ -83,6 +97,8 @@ def _custom_normals(mesh):
 
 
 def _weights(mesh):
+    if not _has_weights(mesh):  # It takes a fifth of the time to know that.
+        return None
     return [[(group.group, group.weight) for group in vertex.groups] for vertex in mesh.vertices]
 
 
