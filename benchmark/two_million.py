@@ -24,6 +24,7 @@ MILLION = 1_000_000
 PATIENCE = 900  # seconds until a button has to be done
 REST = 0.5  # seconds after a button's work in which what it leads to is measured, too
 ESCAPES = 0.02, 0.3, 0.7  # when Esc is pressed, as shares of the time that the button took without
+LATEST = 20  # seconds after which Esc is pressed at the latest
 HEADS = ["Button", "First sign, s", "Until its job, s", "In its job, s", "At its end, s", "Esc, s", "Whole, s"]
 BUMP = 2e-3  # how far the largest vertex is moved, as a share of the torus's radius, so that faces are outside the tolerance
 
@@ -33,6 +34,22 @@ class Beats:
 
     def __init__(self):
         self.noted = []
+        self.drawn = []  # when Blender has drawn the status bar with a text of the add-on
+
+    def begin(self):
+        self.noted.clear()
+        self.drawn.clear()
+        self.note()
+
+    def note_drawn(self, *_):
+        from addon import status_bar
+
+        if status_bar.showing():
+            self.drawn.append(time.monotonic())
+
+    def first(self):
+        """Returns the seconds until the button's work was seen: in the status bar, or else because it was done."""
+        return (self.drawn or [self.noted[1][0]])[0] - self.noted[0][0]
 
     def note(self):
         from addon import job
@@ -127,6 +144,7 @@ def in_blender(count, chosen, escapes):
     preferences.edit.undo_memory_limit = 0
     addon.register()
     beats, folder = Beats(), tempfile.TemporaryDirectory(prefix="tolvol-")
+    bpy.types.STATUSBAR_HT_header.append(beats.note_drawn)
 
     def make_scenes():
         """Saves the scenes that the buttons need."""
@@ -166,8 +184,7 @@ def in_blender(count, chosen, escapes):
         yield from window.at_rest()
         window.xdotool("mousemove", *window.centre())
         yield 0.2
-        beats.noted.clear()
-        beats.note()
+        beats.begin()
         if escape is not None:
             words = ["sh", "-c", f"sleep {escape}; date +%s.%N; xdotool key Escape"]
             keys = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
@@ -193,11 +210,10 @@ def in_blender(count, chosen, escapes):
             if chosen and not any(word.lower() in name.lower() for word in chosen):
                 continue
             whole = yield from pressed(scene, press)
-            first = beats.noted[1][0] - beats.noted[0][0]
-            cells = [f"{first:.2f}", *(f"{gap:.2f}" for gap in beats.gaps())]
+            cells = [f"{beats.first():.2f}", *(f"{gap:.2f}" for gap in beats.gaps())]
             took = []
             for share in ESCAPES if cancels and escapes else ():
-                took.append((yield from pressed(scene, press, share * whole)))
+                took.append((yield from pressed(scene, press, min(share * whole, LATEST))))
             # An operator that had ended before Esc was pressed tells nothing.
             took = [seconds for seconds in took if seconds > 0]
             print("measured", name, *cells, f"{max(took):.2f}" if took else "", f"{whole:.1f}", sep="\t", flush=True)

@@ -16,8 +16,8 @@ def _forget_shown(*_):
 
 @persistent
 def _forget_changed(_scene, depsgraph):
-    if any(update.is_updated_geometry for update in depsgraph.updates):
-        measurements.forget()
+    if changed := {update.id.original for update in depsgraph.updates if update.is_updated_geometry}:
+        measurements.forget_changed(changed)
 
 
 @persistent
