@@ -47,7 +47,8 @@ class Motion:
         self.two_sided = ob.tolvol.keep == "BOTH"
         self.crossings = ob.tolvol.crossings.lower()
         self.faces = self.surface.arrays.triangles
-        if len(ob.data.polygons) < len(self.faces):
+        self._only_triangles = len(ob.data.polygons) == len(self.faces)
+        if not self._only_triangles:
             self.faces, _ = mesh_io.Polygons.of(ob.data).whole_quads(self.faces)
         self.threads = threads
         self.warnings = []  # of hold()
@@ -134,7 +135,9 @@ class Motion:
         once unless `may_hold`.
         """
         for tries_left in reversed(range(_MOST_TRIES)):
-            triangles = mesh_io.triangles_at(self._mesh, vertices)
+            triangles = self.surface.arrays.triangles
+            if not self._only_triangles:
+                triangles = mesh_io.triangles_at(self._mesh, vertices)
             try:
                 return vertices, (yield partial(self.certify, vertices, triangles))
             except NotProved as error:

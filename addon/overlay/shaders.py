@@ -208,7 +208,8 @@ def surface():
     for i, name in enumerate(("colours", "depths")):
         info.sampler(i, "FLOAT_2D", name)
     _add_told(info)
-    info.depth_write("ANY")
+    if hasattr(info, "depth_write"):  # Newer versions of Blender have to be told that the shader writes depths.
+        info.depth_write("ANY")
     return gpu.shader.create_from_info(info)
 
 

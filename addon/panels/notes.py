@@ -9,6 +9,7 @@ import datetime
 
 import bpy
 
+from ..estimate import memory
 from ..job import refusals
 from ..operators import blocked
 from ..overlay import reasons
@@ -36,6 +37,9 @@ def notes(context, ob):
     lines = []
     if reason := in_the_way(ob):
         lines.append((reason, "ERROR"))
+    if needs := memory.told(ob):
+        sentence, is_too_much = needs
+        lines.append((sentence, "ERROR" if is_too_much else "INFO"))
     if refused := refusals.of(ob):
         lines.append((refused, "ERROR"))
     found = verdict.of(ob)

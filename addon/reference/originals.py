@@ -6,6 +6,8 @@ Object.tolvol points to: a copy that Blender saves with the file. Neither is eve
 earlier version has no original, and then only its shape is known.
 """
 
+import operator
+
 import numpy as np
 
 from ..mesh import carry
@@ -46,23 +48,13 @@ def data_names(mesh):
 
 
 def _has_weights(mesh):
-    return any(vertex.groups for vertex in mesh.vertices)
+    return any(map(operator.attrgetter("groups"), mesh.vertices))
 
 
 def with_its_data(mesh):
     """Returns the end of a sentence about a mesh: what data it has, or "" if it has none but its faces."""
     kept = ", ".join(data_names(mesh))
     return f", with its {kept}" if kept else ""
-
-
-def is_bare(mesh, arrays):
-    """Whether a mesh has the faces that `arrays` has as triangles, and none of the data that data_names() names, and no attributes.
-    Marks and flags do not count."""
-    if len(mesh.polygons) != len(arrays.triangles) or data_names(mesh):
-        return False
-    if any(carry.attributes(mesh, domain) for domain in ("POINT", "EDGE", "FACE", "CORNER")):
-        return False
-    return column(mesh.loops, "vertex_index", 1, np.int32).tobytes() == arrays.triangles.tobytes()
 
 
 def _uv_maps(mesh):

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Estimates the memory that Decimate takes at its peak, so that the panel can name it before Decimate is pressed."""
+
+import re
+from pathlib import Path
+
+from ..mesh import mesh_io
+from ..reference import snapshots
+
+# Bytes for each triangle of the mesh and of its reference: a little more than Decimate takes of meshes whose edges are not much
+# longer than the tolerance. The copies in Blender are among them (benchmark/memory.py, benchmark/two_million.py).
+_OF_MESH, _OF_REFERENCE = 550, 350
+# The memory of smaller meshes is not worth a sentence.
+LEAST = 500_000_000
+
+
+def needed(ob):
+    """Returns how many bytes Decimate takes for an object, or None if it has no reference."""
+    reference = ob.tolvol.snapshot
+    if reference is None:
+        source = snapshots.source_object(ob)
+        if source is None or source.type != "MESH":
+            return None
+        reference = source.data
+    return _OF_MESH * mesh_io.triangle_count(ob.data) + _OF_REFERENCE * mesh_io.triangle_count(reference)
+
+
+def free():
+    """Returns how many bytes the system can still give, or None where it does not tell."""
+    try:
+        found = re.search(r"MemAvailable:\s+(\d+) kB", Path("/proc/meminfo").read_text())
+    except OSError:
+        return None
+    return 1024 * int(found[1]) if found else None
+
+
+def told(ob):
+    """Returns (a sentence about the memory that Decimate takes for an object, whether there is not as much), or None for a small
+    mesh."""
+    need, there = needed(ob), free()
+    if need is None or need < LEAST:
+        return None
+    sentence = f"Decimate takes about {_gigabytes(need)} of memory"
+    return (
+        sentence if there is None else f"{sentence}, and {_gigabytes(there)} are free"
+    ), there is not None and need > there
+
+
+def _gigabytes(size):
+    return f"{size / 1e9:.2g} GB"
