@@ -10,7 +10,6 @@ software would hide everything else: benchmark/redraw.py measures that. The scri
 """
 
 import argparse
-import contextlib
 import os
 import subprocess
 import sys
@@ -21,7 +20,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), *(str(ROOT / name) for name in ("benchmark", "tests/ui", "tests/blender", "tests/python"))]
 MILLION = 1_000_000
-LIMIT = 90  # seconds after which a button's work is cancelled: the table then says that it takes longer
+LIMIT = 45  # seconds after which a button's work is cancelled: the table then says that it takes longer
 REST = 0.5  # seconds after a button's work in which what it leads to is measured, too
 ESCAPES = 0.02, 0.3, 0.7  # when Esc is pressed, as shares of the time that the button took without
 LATEST = 20  # seconds after which Esc is pressed at the latest

@@ -12,8 +12,9 @@ from ..shared.errors import Refused
 from . import adjusting, progress_text, run
 from .interruptions import runs, under_way, undo_count
 
-# Blender draws nothing while a run takes its objects' meshes, which takes 0.05 to 0.1 s for this many faces together. For as many
-# or more, the operator first shows in the status bar that it has begun, and reads the meshes in parts, between which it takes Esc.
+# Blender draws nothing while a run takes its objects' meshes, which takes 0.05 to 0.1 s for this many faces together. For as
+# many or more, the operator first shows in the status bar that it has begun, and reads the meshes in parts, between which it
+# takes Esc.
 LARGE = 100_000
 
 _SOON = 0.02  # seconds, in which Blender draws the status bar

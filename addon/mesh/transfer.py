@@ -16,7 +16,6 @@ from .carry import Carry
 from .filling import add_faces
 from .mesh_io import column, edges_of_faces
 
-
 # Vertices are removed one by one, so many between two breaths: 0.1 s.
 _PIECE = 100_000
 

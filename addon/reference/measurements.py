@@ -323,7 +323,8 @@ def _fingerprint_key(ob):
 
 
 def hold(ob):
-    """Notes that nothing changes the mesh of `ob` until let_go(): to read a large one at each drawing of a panel takes seconds."""
+    """Notes that nothing changes the mesh of `ob` until let_go(): to read a large mesh for each drawing of a panel takes
+    seconds."""
     shown_fingerprint(ob)
     _held.add(ob.as_pointer())
 

@@ -234,6 +234,27 @@ def far():
     return int(((blue > 60) & (np.maximum(abs(red - green), abs(green - blue)) > 25)).sum())
 
 
+def test_triangles_are_drawn_once_for_each_drawing_of_the_view():
+    yield from reset(ball)
+    bpy.ops.tolvol.set_reference()
+    xdotool("mousemove", *beside())
+    yield from finished(lambda: near() > 30_000)
+    calls, shading = [], view()[1].spaces[0].shading
+    draw, fill = overlay.surface.Surface.draw, overlay.draw._fill
+    overlay.surface.Surface.draw = lambda *about: calls.append("triangles") or draw(*about)
+    overlay.draw._fill = lambda *about: calls.append("view") or fill(*about)
+    try:
+        for shading.show_xray in (False, True):
+            calls.clear()
+            view()[1].tag_redraw()
+            yield from finished(lambda: calls)
+            yield
+            assert calls.count("triangles") == calls.count("view"), calls
+    finally:
+        overlay.surface.Surface.draw, overlay.draw._fill = draw, fill
+        shading.show_xray = False
+
+
 def test_what_deviates_by_nothing_is_drawn_as_nothing():
     for make in (thin_sheets, fine_monkey):
         yield from reset(make)
