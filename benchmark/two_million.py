@@ -215,7 +215,7 @@ def in_blender(count, chosen, escapes):
                 continue
             whole = yield from pressed(scene, press)
             cells = [f"{beats.first():.2f}", *(f"{gap:.2f}" for gap in beats.gaps())]
-            memory = f"{beats.memory.peak() / 1e6 - beats.memory.before / 1e6:,.0f}"
+            memory = f"{max(beats.memory.peak() - beats.memory.before, 0) / 1e6:,.0f}"
             lasted, took = f"{whole:.1f}" if whole < LIMIT else f"> {LIMIT}", []
             for share in ESCAPES if cancels and escapes else ():
                 took.append((yield from pressed(scene, press, min(share * whole, LATEST))))
