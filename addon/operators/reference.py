@@ -33,12 +33,19 @@ def loses_something(ob):
     places = mesh_io.matrix_array(source.matrix_world), snapshots.reference_matrix(ob)
     if not np.array_equal(*(place.astype(np.float32) for place in places)):
         return True
-    source.update_from_editmode()
-    # The panel mostly knows the fingerprint: to read a large mesh would take longer than a person waits.
-    if measurements.shown_fingerprint(source) != ob.tolvol.snapshot_fingerprint:
+    if _fingerprint(source) != ob.tolvol.snapshot_fingerprint:
         return True
     original = ob.tolvol.original
     return original is not None and not originals.same_data(source.data, original)
+
+
+def _fingerprint(source):
+    if source.mode == "OBJECT":
+        # The panel mostly knows it: to read a large mesh would take longer than a person waits.
+        return measurements.shown_fingerprint(source)
+    # Blender does not tell when it writes the mesh of another mode.
+    source.update_from_editmode()
+    return mesh_io.read_mesh(source.data).fingerprint()
 
 
 def _lost(ob):
