@@ -1,6 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Writes the manual as a page that every browser shows: cmake -D CMARK=... -D MANUAL=....md -D PAGE=....html -P manual.cmake
 execute_process(COMMAND ${CMARK} --extension table ${MANUAL} OUTPUT_VARIABLE body COMMAND_ERROR_IS_FATAL ANY)
+# A link may lead to a section: the anchor of a heading is its words in lower case, with hyphens, as in docs/manual.md.
+string(REGEX MATCHALL "<h2>[^<]*</h2>" headings "${body}")
+foreach(heading IN LISTS headings)
+  string(REGEX REPLACE "</?h2>" "" words "${heading}")
+  string(TOLOWER "${words}" anchor)
+  string(REGEX REPLACE "[^a-z0-9]+" "-" anchor "${anchor}")
+  string(REPLACE "${heading}" "<h2 id=\"${anchor}\">${words}</h2>" body "${body}")
+endforeach()
 file(WRITE ${PAGE} "<!DOCTYPE html>
 <html lang=\"en\">
 <meta charset=\"utf-8\">

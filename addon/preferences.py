@@ -25,6 +25,9 @@ PERCENT = {
 }
 
 
+_PROBLEM = "report-a-problem"  # the anchor of the manual's section
+
+
 def manual():
     """Returns the path of the manual: in the package a page beside the add-on's files, in a checkout the file in docs/."""
     folder = Path(__file__).resolve().parent
@@ -59,7 +62,9 @@ class TOLVOL_AP_preferences(bpy.types.AddonPreferences):
 
     def draw(self, context):
         self.layout.use_property_split = True
-        self.layout.operator("wm.url_open", text="Manual", icon="HELP").url = manual().as_uri()
+        row, page = self.layout.row(align=True), manual().as_uri()
+        row.operator("wm.url_open", text="Manual", icon="HELP").url = page
+        row.operator("wm.url_open", text="Report a Problem", icon="URL").url = f"{page}#{_PROBLEM}"
         self.layout.operator("tolvol.copy_problem_report", icon="COPYDOWN")
         if native.module is None:
             text_lines(context, self.layout, native.reason, "ERROR")

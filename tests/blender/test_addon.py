@@ -211,6 +211,7 @@ ok()
     assert f"manual at {packed}" in out
     page = packed.read_text()
     assert "<h1>Manual</h1>" in page and "<table>" in page
+    assert f'<h2 id="{preferences._PROBLEM}">' in page
     pictures = re.findall(r'<img src="([^"]*)"', page)
     assert len(pictures) >= 3 and all((packed.parent / picture).is_file() for picture in pictures)
     assert preferences.manual() == ROOT / "docs" / "manual.md"
