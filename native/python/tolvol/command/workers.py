@@ -4,14 +4,17 @@
 import contextlib
 import logging
 import re
+import uuid
 
 from ..shared import package
 from ..shared.command.arguments import Stop
 from .progress_bar import counted, followed
 
 _GO_ON = "what is done is kept: go on with --resume"
-# A task whose worker dies is done anew so many times.
-_MOST_DEATHS = 10
+_SHORT = "as it does where memory is short: give the workers more"
+# A task whose worker dies, or that finds no memory, is done anew so many times. Another scheduler than that of local:N has a
+# setting of its own for workers that die.
+_MOST_TRIES = 10
 # The level of the logs of the workers on this machine. A worker reads it when it starts. One that is ended in the middle of a
 # heartbeat would log an error after all is done; the command says itself where a task fails.
 _LOG_LEVEL = "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED"
@@ -43,7 +46,7 @@ def dask(scheduler):
 
     with contextlib.ExitStack() as stack:
         stack.enter_context(
-            dask.config.set({"distributed.scheduler.allowed-failures": _MOST_DEATHS, _LOG_LEVEL: "critical"})
+            dask.config.set({"distributed.scheduler.allowed-failures": _MOST_TRIES, _LOG_LEVEL: "critical"})
         )
         if count := local_count(scheduler):
             # The native code has its own idea of the memory: a worker is not stopped for it.
@@ -59,8 +62,11 @@ def dask(scheduler):
             client = stack.enter_context(Client(scheduler))
         except OSError as error:
             raise Stop(f"--scheduler {scheduler}: no connection ({error})") from None
-        _require_same_version(client)
         print(f"dashboard of Dask: {client.dashboard_link}", flush=True)
+        if not client.scheduler_info()["workers"]:
+            print(f"--scheduler {scheduler}: there are no workers yet; waiting for one", flush=True)
+            client.wait_for_workers(1)
+        _require_same_version(client)
         yield lambda title, work, jobs: _tasks(client, title, work, jobs)
 
 
@@ -83,16 +89,37 @@ def _tasks(client, title, work, jobs):
     from distributed.comm import CommClosedError
     from distributed.scheduler import KilledWorker
 
-    futures = client.map(work, jobs, pure=False)
+    # The dashboard shows what stands before the first "-" as the group of the task. The last part is of this call alone.
+    own = uuid.uuid4().hex
+    names = [f"{title}-cell {job.cell}-{own}" for job in jobs]
+    futures = client.map(_attempt, [work] * len(jobs), jobs, key=names, retries=_MOST_TRIES, pure=False)
     try:
         for future in counted(title, as_completed(futures), len(jobs)):
-            yield future.result()
-    except KilledWorker:
+            if error := future.result():
+                raise error
+            yield None
+    except KilledWorker as error:
         raise Stop(
-            f"{title}: the work in a cell has ended {_MOST_DEATHS} workers, as it does where memory is short: give the "
-            f"workers more; {_GO_ON}"
+            f"{title}: the work in a cell has ended {error.allowed_failures + 1} workers, {_SHORT}; {_GO_ON}"
+        ) from None
+    except MemoryError:
+        raise Stop(
+            f"{title}: the work in a cell has found no memory {_MOST_TRIES + 1} times, {_SHORT}; {_GO_ON}"
         ) from None
     except (CommClosedError, FutureCancelledError):
         raise Stop(f"{title}: the connection to the scheduler is lost; {_GO_ON}", 1) from None
     finally:
         client.cancel(futures)
+
+
+def _attempt(work, job):
+    """Returns the error that ended the work, or None. Dask does a task anew that raises one, as only a lack of memory does here:
+    other work on the machine may take less of it later. All other errors would come again."""
+    try:
+        work(job)
+        return None
+    except MemoryError as error:
+        text = str(error)
+    except Exception as error:
+        return error
+    raise MemoryError(text)  # without the stack, which would keep the arrays of the work in memory

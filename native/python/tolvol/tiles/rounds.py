@@ -10,6 +10,7 @@ import ctypes
 import math
 from dataclasses import dataclass, replace
 from functools import reduce
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,11 +59,19 @@ def needed_space(mesh):
     return 3 * mesh.count * of_triangle
 
 
+class Job(NamedTuple):
+    """The work of a step in one cell."""
+
+    cell: int  # its number in the round, from 1
+    tile: Tile
+    path: str  # of its record, and of its chunk if it makes one
+
+
 class Rounds:
     """A run. `each(stage, title, function, jobs)` yields function(job, progress) for all jobs, and shows the progress.
 
-    The stage is "read", whose jobs are to be done here and in their order, "decimation" or "certify". The jobs of these are for
-    any process, in any order.
+    The stage is "read", whose jobs are to be done here and in their order, "decimation" or "certify". The jobs of these are each
+    a Job, for any process, in any order.
     """
 
     def __init__(self, mesh, plan, folder, tolerance, options, each):
@@ -152,7 +161,10 @@ class Rounds:
 
     def _steps(self, stage, title, name, work, like, boxes):
         """Returns the records of the work in all cells, and does what has none yet."""
-        jobs = [(replace(like, cell=box), str(self._scratch.path(f"{name}_{i:05}"))) for i, box in enumerate(boxes)]
+        jobs = [
+            Job(i + 1, replace(like, cell=box), str(self._scratch.path(f"{name}_{i:05}")))
+            for i, box in enumerate(boxes)
+        ]
         missing = [job for i, job in enumerate(jobs) if self._scratch.record(f"{name}_{i:05}") is None]
         for _ in self._each(stage, title, work, missing):
             pass
@@ -169,19 +181,17 @@ def _expected_gain(counts):
 
 
 def decimate(job, progress=None):
-    """Does the work of a round in one cell, and notes that it is done. job: (Tile, the path of its chunk)."""
-    one, path = job
-    chunk, angle, warnings = tile.decimate(one, path, progress)
+    """Does the work of a round in one cell, and notes that it is done."""
+    chunk, angle, warnings = tile.decimate(job.tile, job.path, progress)
     _give_back()
-    scratch.keep(path, {"chunk": chunk.record(), "angle": angle, "warnings": warnings})
+    scratch.keep(job.path, {"chunk": chunk.record(), "angle": angle, "warnings": warnings})
 
 
 def measure(job, progress=None):
-    """Measures both distances in one cell, and notes them. job: (Tile, the path of its record)."""
-    one, path = job
-    forward, backward = tile.measure(one, progress)
+    """Measures both distances in one cell, and notes them."""
+    forward, backward = tile.measure(job.tile, progress)
     _give_back()
-    scratch.keep(path, {"forward": forward, "backward": backward})
+    scratch.keep(job.path, {"forward": forward, "backward": backward})
 
 
 def _give_back():
