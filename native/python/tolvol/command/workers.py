@@ -44,6 +44,7 @@ def dask(scheduler):
     import dask.config
     from distributed import Client, LocalCluster
 
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # The command says itself what has failed.
     with contextlib.ExitStack() as stack:
         stack.enter_context(
             dask.config.set({"distributed.scheduler.allowed-failures": _MOST_TRIES, _LOG_LEVEL: "critical"})
