@@ -15,15 +15,17 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import planet
-import tables
 from dask.utils import key_split
 from distributed import Client, LocalCluster, WorkerPlugin
+
+import planet
+import tables
 from machine import machine
 
 ROOT = Path(__file__).resolve().parents[1]
 MODULE = Path(os.environ.get("TOLVOL_PYTHON_PATH", str(ROOT / "build" / "release" / "python")))
-os.environ["PYTHONPATH"] = str(MODULE)  # of the command and of the workers
+os.environ["PYTHONPATH"] = str(MODULE)  # of the command
+sys.path.insert(0, str(MODULE))  # The workers get this list.
 MILLION, MEGA = 1_000_000, 1e6
 MODELLED = (1, 2, 4, 8, 16, 32)
 
@@ -98,7 +100,7 @@ class Run:
 def run(source, folder, count, options):
     """Decimates a file on so many workers of one thread, and returns the Run."""
     out, report = folder / "out.ply", folder / "report.json"
-    cluster = LocalCluster(n_workers=count, threads_per_worker=1, memory_limit=None, dashboard_address=None)
+    cluster = LocalCluster(n_workers=count, threads_per_worker=1, memory_limit=None, dashboard_address="127.0.0.1:0")
     with cluster, Client(cluster) as client:
         client.register_plugin(Counter(), name="counter")
         client.get_task_stream()
