@@ -100,9 +100,8 @@ def _tasks(client, title, work, jobs):
                 raise error
             yield None
     except KilledWorker as error:
-        raise Stop(
-            f"{title}: the work in a cell has ended {error.allowed_failures + 1} workers, {_SHORT}; {_GO_ON}"
-        ) from None
+        ended = f"{error.allowed_failures + 1} workers" if error.allowed_failures else "its worker"
+        raise Stop(f"{title}: the work in a cell has ended {ended}, {_SHORT}; {_GO_ON}") from None
     except MemoryError:
         raise Stop(
             f"{title}: the work in a cell has found no memory {_MOST_TRIES + 1} times, {_SHORT}; {_GO_ON}"
