@@ -35,7 +35,7 @@ class Comparison(JobOperator):
         ob = self.ob
         surface = snapshots.surface_of(ob)
         yield breathe
-        reference = snapshots.reference_of(ob)
+        reference = snapshots.reference_of(ob, surface)
         yield breathe
         tolerance = tolerances.required(ob, reference.size())
         threads = self.threads or preferences.threads(context)

@@ -46,6 +46,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         options={"SKIP_SAVE"},
     )
     threads: threads_setting()
+    _found = ()  # (number of triangles, value) of each value at which no sample is beyond the tolerance
 
     def draw(self, _context):
         self.layout.use_property_split = True
@@ -53,7 +54,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         self.layout.prop(self, "result")
 
     def steps(self, context):
-        self._found = []  # (number of triangles, value) of each value at which no sample is beyond the tolerance
+        self._found = []
         context.view_layer.update()
         ob, modifier = self.ob, self.chosen(fitted=True)
         if self.result == "SHAPE_KEY":

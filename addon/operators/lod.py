@@ -4,6 +4,7 @@ the reference in both directions."""
 
 import contextlib
 import math
+from dataclasses import replace
 
 import bpy
 from bpy.props import IntProperty
@@ -11,7 +12,7 @@ from bpy.props import IntProperty
 from .. import preferences
 from ..files.gltf_extras import GEOMETRIC_ERROR
 from ..job import WRITE, JobOperator, breathe
-from ..mesh import transfer
+from ..mesh import mesh_io, transfer
 from ..operation_settings import lod_settings, threads_setting
 from ..proof import verdict
 from ..properties import automatic_placement
@@ -85,7 +86,8 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
     def _tasks(self, context):
         """A generator for steps(): returns the Task of each level."""
         ob = self.ob
-        reference = snapshots.reference_of(ob)
+        # If the object is moved while its meshes are read, they belong together all the same.
+        reference, matrix = snapshots.reference_of(ob), mesh_io.matrix_array(ob.matrix_world)
         yield breathe
         limits = self._limits(context, reference.size())
         if self.by == "TOLERANCE":  # Choosing the other unit in Adjust Last Operation then keeps the tolerances.
@@ -96,7 +98,7 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             placement = settings.placement if chosen else automatic_placement(original.data)
             asked = decimation.options(settings, placement, self.threads or preferences.threads(context))
             asked |= {"two_sided": True, "target_triangles": None, "outside": "error"}
-            surface, tasks = snapshots.surface_of(original), []
+            surface, tasks = replace(snapshots.surface_of(original), matrix=matrix), []
             for limit in limits:
                 yield breathe
                 tasks.append(decimation.task(original, surface, reference, limit, settings, dict(asked)))

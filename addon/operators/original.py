@@ -13,7 +13,7 @@ from mathutils import Matrix
 
 from .. import status_bar
 from ..proof import last_run
-from ..reference import measurements, originals, snapshots
+from ..reference import originals, snapshots
 from .asking import ask
 from .blocked import allowed, mesh_blocked, object_blocked
 
@@ -77,7 +77,6 @@ class _Shown:
     def __init__(self, context, ob):
         self.ob = ob
         self._was_hidden, self._was_selected = ob.hide_get(), ob.select_get()
-        measurements.hold(ob)
         self.twin = twin_of(ob, originals.kept(ob))
         self.twin.name = f".{ob.name} original"
         _link(context, ob, self.twin)
@@ -86,7 +85,6 @@ class _Shown:
             handlers.append(_end_before)
 
     def end(self):
-        measurements.let_go()
         for handlers in _handlers():
             if _end_before in handlers:
                 handlers.remove(_end_before)

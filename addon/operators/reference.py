@@ -9,7 +9,7 @@ from .. import preferences
 from ..job import JobOperator, breathe
 from ..mesh import mesh_io
 from ..operation_settings import threads_setting
-from ..reference import measurements, originals, snapshots, tolerances
+from ..reference import originals, snapshots, tolerances
 from ..shared import volumes
 from .asking import ask
 from .blocked import allowed, reference_blocked, settings_blocked
@@ -33,19 +33,11 @@ def loses_something(ob):
     places = mesh_io.matrix_array(source.matrix_world), snapshots.reference_matrix(ob)
     if not np.array_equal(*(place.astype(np.float32) for place in places)):
         return True
-    if _fingerprint(source) != ob.tolvol.snapshot_fingerprint:
+    source.update_from_editmode()
+    if mesh_io.read_mesh(source.data).fingerprint() != ob.tolvol.snapshot_fingerprint:
         return True
     original = ob.tolvol.original
     return original is not None and not originals.same_data(source.data, original)
-
-
-def _fingerprint(source):
-    if source.mode == "OBJECT":
-        # The panel mostly knows it: to read a large mesh would take longer than a person waits.
-        return measurements.shown_fingerprint(source)
-    # Blender does not tell when it writes the mesh of another mode.
-    source.update_from_editmode()
-    return mesh_io.read_mesh(source.data).fingerprint()
 
 
 def _lost(ob):

@@ -203,7 +203,7 @@ a table (.csv) or all numbers (.json)"""
         settings = ob.tolvol
         surface = snapshots.surface_of(ob)
         yield breathe
-        reference = snapshots.reference_of(ob)
+        reference = snapshots.reference_of(ob, surface)
         yield breathe
         size = reference.size()
         tolerance = tolerances.required(ob, size)

@@ -16,8 +16,9 @@ def _forget_shown(*_):
 
 @persistent
 def _forget_changed(_scene, depsgraph):
-    if changed := {update.id.original for update in depsgraph.updates if update.is_updated_geometry}:
-        measurements.forget_changed(changed)
+    # Blender does not tell of each change: a frame that is changed leaves some out. So the next one it tells of is for all.
+    if any(update.is_updated_geometry for update in depsgraph.updates):
+        measurements.forget()
 
 
 @persistent

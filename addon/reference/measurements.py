@@ -9,7 +9,6 @@ is not stored with the object at all, because that would need an undo step.
 import datetime
 from dataclasses import dataclass, fields, replace
 
-import bpy
 import numpy as np
 
 from .. import native
@@ -18,10 +17,8 @@ from ..redraw import redraw_views
 from ..shared.proof.verdict import Interval
 from . import snapshots, tolerances
 
-# Cache of numbers that panels show: (object, "size" or "fingerprint", ...) -> value. When a mesh changes, all sizes and its own
-# fingerprint are removed.
+# Cache of numbers that panels show: (object, "size" or "fingerprint", ...) -> value. It is cleared when any mesh changes.
 _shown = {}
-_held = set()  # pointers of objects that no view shows and that stay as they are
 
 
 # An object counts as scaled if the lengths of its axes or the angles between them change by more than this, relatively.
@@ -313,7 +310,7 @@ def shown_fingerprint(ob):
     """Returns the fingerprint of the object's mesh, for drawing: it is computed only after a change. Blender does not tell of
     changes of an object that no view shows."""
     key = _fingerprint_key(ob)
-    if key not in _shown or not (ob.visible_get() or key[0] in _held):
+    if key not in _shown or not ob.visible_get():
         _shown[key] = mesh_io.read_mesh(ob.data).fingerprint()
     return _shown[key]
 
@@ -322,26 +319,8 @@ def _fingerprint_key(ob):
     return ob.as_pointer(), "fingerprint"
 
 
-def hold(ob):
-    """Notes that nothing changes the mesh of `ob` until let_go(): to read a large mesh for each drawing of a panel takes
-    seconds."""
-    shown_fingerprint(ob)
-    _held.add(ob.as_pointer())
-
-
-def let_go():
-    _held.clear()
-
-
 def forget():
     _shown.clear()
-
-
-def forget_changed(changed):
-    """Forgets what is shown of objects that have changed. changed: objects and meshes."""
-    pointers = {ob.as_pointer() for ob in bpy.data.objects if ob in changed or ob.data in changed}
-    for key in [key for key in _shown if key[0] in pointers or key[1] == "size"]:
-        del _shown[key]
 
 
 def forget_kept():

@@ -43,7 +43,8 @@ def source_object(ob):
 def reference_of(ob, own=None):
     """Returns the reference at its present place. If none is set, it returns the mesh that Set Reference would take.
 
-    own: the Surface of `ob` as it is now, if it has been read: it is not read again where it is the reference.
+    own: the Surface of `ob`, if it has been read: it is not read again where it is the reference. If the object was moved since,
+    its own reference is where it was then, so that the two belong together.
     """
     settings = ob.tolvol
     if settings.snapshot is None:
@@ -54,7 +55,8 @@ def reference_of(ob, own=None):
     reason = stale_reason(ob)
     if reason:
         raise Refused(f"The reference of {ob.name} is out of date: {reason}. {REMEDY}")
-    return Surface(mesh_io.read_mesh(settings.snapshot), reference_matrix(ob))
+    matrix = own.matrix if own is not None and settings.snapshot_kind == "SELF" else reference_matrix(ob)
+    return Surface(mesh_io.read_mesh(settings.snapshot), matrix)
 
 
 def reference_matrix(ob):

@@ -35,7 +35,7 @@ def _joined(groups, values):
     order = np.lexsort((values, groups))
     groups, values = groups[order], values[order]
     begins = np.ones(len(order), bool)
-    with np.errstate(invalid="ignore"):  # A damaged file may hold any number.
+    with np.errstate(invalid="ignore", over="ignore"):  # A damaged file may hold any number.
         near = np.diff(values) < _SAME_UV * np.maximum(1, np.abs(values[1:]))
     begins[1:] = (np.diff(groups) != 0) | ~near
     joined = np.empty_like(values)

@@ -12,10 +12,10 @@ import pytest
 from addon.estimate import memory
 from addon.job import interruptions, run
 from addon.mesh import mesh_io, transfer
-from addon.operators import original, reference
+from addon.operators import fit_modifier, reference
 from addon.panels import notes
 from addon.proof import verdict
-from addon.reference import measurements
+from addon.reference import snapshots
 from scenes import cage, torus
 from test_job import Context, Modal, event
 
@@ -154,45 +154,46 @@ def test_no_mesh_is_made_to_cut_triangles():
 # What panels read ----------------------------------------------------------------------------------------------------
 
 
-def test_a_mesh_is_not_read_again_while_its_original_is_shown(reads):
-    ob = torus()
-    assert bpy.ops.tolvol.decimate() == {"FINISHED"}
-    bpy.context.view_layer.update()
-    original._shown.append(original._Shown(bpy.context, ob))
-    try:
-        bpy.context.view_layer.update()
-        verdict.of(ob)
-        reads.clear()
-        assert ob.hide_get() and verdict.of(ob) == verdict.of(ob) and "read" not in reads
-    finally:
-        original._end()
-    ob.hide_set(True)
-    verdict.of(ob)
-    assert "read" in reads  # Blender does not tell of changes of what is hidden otherwise.
-
-
-def test_another_object_does_not_make_a_mesh_read_again(reads):
-    ob = torus()
-    assert bpy.ops.tolvol.decimate() == {"FINISHED"}
-    bpy.context.view_layer.update()
-    known = measurements.shown_fingerprint(ob)
-    torus(name="other")
-    reads.clear()
-    assert measurements.shown_fingerprint(ob) == known and not reads
-    ob.data.vertices[0].co.x += 1
-    bpy.context.view_layer.update()
-    assert measurements.shown_fingerprint(ob) != known and reads == ["read"]
-
-
-def test_what_the_panel_knows_is_not_read_to_ask_before_the_reference_is_replaced(reads):
+@pytest.mark.parametrize("work", ("check", "worst_point", "decimate", "smooth"))
+def test_a_mesh_and_its_own_reference_are_at_one_place_although_the_object_moves_while_they_are_read(work, monkeypatch):
     ob = torus()
     assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
-    assert not reference.loses_something(ob)
-    ob.data.vertices[0].co.x += 1
+    for vertex in ob.data.vertices:
+        vertex.co.z += 0.3
+    ob.data.update()
+    read = snapshots.reference_of
+
+    def moved(ob, own=None):
+        ob.location.z += 0.3
+        bpy.context.view_layer.update()
+        return read(ob, own)
+
+    monkeypatch.setattr(snapshots, "reference_of", moved)
+    if work in ("decimate", "smooth"):
+        with pytest.raises(RuntimeError, match="not within the tolerance"):
+            getattr(bpy.ops.tolvol, work)()
+        return
+    assert getattr(bpy.ops.tolvol, work)() == {"FINISHED"}
+    found = verdict.of(ob)
+    assert found is None or not found.passed and found.forward.upper > 0.25
+
+
+def test_a_change_that_blender_does_not_tell_of_is_seen_with_the_next_one():
+    ob = torus()
+    assert bpy.ops.tolvol.decimate() == {"FINISHED"} and verdict.of(ob).passed
+    other = torus(name="other")
+    co = mesh_io.column(ob.data.vertices, "co", 3)
+    co[0] += 1
+    ob.data.vertices.foreach_set("co", co.ravel())
+    ob.data.update()
+    bpy.context.scene.frame_set(5)  # It evaluates the mesh, and calls no handler of changes.
+    other.data.vertices[0].co.x += 1
     bpy.context.view_layer.update()
-    measurements.shown_fingerprint(ob)
-    reads.clear()
-    assert reference.loses_something(ob) and not reads
+    assert verdict.of(ob) is None and reference.loses_something(ob)
+
+
+def test_esc_before_the_first_step_of_a_fit_finds_no_result_to_keep():
+    assert not fit_modifier.TOLVOL_OT_fit_modifier._found
 
 
 # Memory --------------------------------------------------------------------------------------------------------------
