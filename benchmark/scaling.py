@@ -78,7 +78,7 @@ class Run:
     stages: dict
     tasks: list
     triangles: int
-    digest: bytes
+    result: bytes  # the file
 
     @property
     def serial(self):
@@ -236,7 +236,7 @@ def main():
                 print(f"{count} workers: {found.seconds:.1f} s, {found.stages}", flush=True)
                 runs[count] = min(found, runs.get(count, found), key=lambda found: found.seconds)
     one = runs[min(runs)]
-    if len({found.digest for found in runs.values()}) > 1:
+    if len({found.result for found in runs.values()}) > 1:
         sys.exit("scaling.py: the results differ")
     stages = ", ".join(f"{name} {seconds:.1f}" for name, seconds in one.stages.items())
     asked = f"{triangles:,} triangles at {options.tolerance}, `--memory {options.memory}`, one thread a worker"

@@ -37,13 +37,13 @@ def free():
 def told(ob):
     """Returns (a sentence about the memory that Decimate takes for an object, whether there is not as much), or None for a small
     mesh."""
-    need, there = needed(ob), free()
+    need = needed(ob)
     if need is None or need < LEAST:
         return None
-    sentence = f"Decimate takes about {_gigabytes(need)} of memory"
-    return (
-        sentence if there is None else f"{sentence}, and {_gigabytes(there)} are free"
-    ), there is not None and need > there
+    sentence, there = f"Decimate takes about {_gigabytes(need)} of memory", free()
+    if there is None:
+        return sentence, False
+    return f"{sentence}, and {_gigabytes(there)} are free", need > there
 
 
 def _gigabytes(size):

@@ -8,15 +8,16 @@ import bpy
 import numpy as np
 
 from .. import native, preferences
-from ..job import JobOperator, breathe
+from ..job import JobOperator
 from ..mesh import mesh_io
 from ..operation_settings import threads_setting
 from ..proof import statistics, verdict
-from ..reference import measurements, snapshots, tolerances
+from ..reference import measurements, tolerances
 from ..shared.proof import measure, report
 from ..shared.proof.certify import outside
 from ..shared.proof.verdict import BEYOND, ONE_WAY, WITHIN, Verdict
 from .blocked import allowed, check_blocked
+from .reading import mesh_and_reference
 from .staying import show_selected
 
 
@@ -33,10 +34,7 @@ class Comparison(JobOperator):
     def prepare(self, context):
         context.view_layer.update()
         ob = self.ob
-        surface = snapshots.surface_of(ob)
-        yield breathe
-        reference = snapshots.reference_of(ob, surface)
-        yield breathe
+        surface, reference = yield from mesh_and_reference(ob)
         tolerance = tolerances.required(ob, reference.size())
         threads = self.threads or preferences.threads(context)
         self.two_sided = ob.tolvol.keep == "BOTH"

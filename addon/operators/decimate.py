@@ -7,7 +7,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from .. import preferences
-from ..job import WRITE, JobOperator, breathe
+from ..job import WRITE, JobOperator
 from ..mesh import transfer
 from ..operation_settings import PROTECTED, decimate_settings, threads_setting
 from ..proof import verdict
@@ -19,6 +19,7 @@ from ..wrapping import fits_tick, property_fields
 from . import decimation, original
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
+from .reading import mesh_and_reference
 
 
 def draw_decimate_settings(layout, settings):
@@ -133,10 +134,7 @@ object. An object without a reference gets one first, as by Set Reference"""
 
     def _task(self, context, ob):
         """A generator for steps(): returns the Task of an object."""
-        surface = snapshots.surface_of(ob)
-        yield breathe
-        reference = snapshots.reference_of(ob, surface)
-        yield breathe
+        surface, reference = yield from mesh_and_reference(ob)
         tolerance = tolerances.tolerance_length(self, reference.size())
         placement = automatic_placement(ob.data) if self.own_placements else self.placement
         options = decimation.options(self, placement, self.threads or preferences.threads(context))

@@ -6,7 +6,6 @@ import numpy as np
 from bpy.props import FloatProperty, StringProperty
 
 from .. import native, preferences
-from ..job import breathe
 from ..mesh import mesh_io
 from ..mesh.evaluation import Evaluation
 from ..operation_settings import modifier_settings, threads_setting
@@ -22,6 +21,7 @@ from ..shared.surface import Surface
 from . import decimation, fit
 from . import settings as shared
 from .modifiers import ModifierOperator
+from .reading import mesh_and_reference
 
 
 class TOLVOL_OT_fit_modifier(ModifierOperator, bpy.types.Operator):
@@ -59,10 +59,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         ob, modifier = self.ob, self.chosen(fitted=True)
         if self.result == "SHAPE_KEY":
             raise Refused(f"{modifier.name} changes the faces of {ob.name}: choose Replace or New Object")
-        surface = snapshots.surface_of(ob)
-        yield breathe
-        reference = snapshots.reference_of(ob, surface)
-        yield breathe
+        surface, reference = yield from mesh_and_reference(ob)
         name, trial = modifier.name, _Trial(ob, surface, reference, self.threads or preferences.threads(context))
         # It comes before the search, so that Esc in the search does not leave it out.
         self._plain = yield from self._of_decimate(context, trial)

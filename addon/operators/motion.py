@@ -8,7 +8,6 @@ import bmesh
 import numpy as np
 
 from .. import native
-from ..job import breathe
 from ..mesh import mesh_io
 from ..proof import last_run
 from ..reference import measurements, snapshots, tolerances
@@ -18,6 +17,7 @@ from ..shared.proof import report, solidity
 from ..shared.proof.certify import certify
 from ..shared.proof.verdict import Interval, Verdict
 from ..shared.surface import Surface
+from .reading import mesh_and_reference
 
 _FOUND = {"forward": "the result is {} from the reference", "backward": "the reference is {} from the result"}
 
@@ -34,10 +34,7 @@ class Motion:
     def of(cls, ob, threads):
         """A generator for an operator's steps(): reads the mesh of an object and its reference, and returns the Motion."""
         ob.update_from_editmode()
-        surface = snapshots.surface_of(ob)
-        yield breathe
-        reference = snapshots.reference_of(ob, surface)
-        yield breathe
+        surface, reference = yield from mesh_and_reference(ob)
         return cls(ob, surface, reference, threads)
 
     def __init__(self, ob, surface, reference, threads):
@@ -135,9 +132,8 @@ class Motion:
         once unless `may_hold`.
         """
         for tries_left in reversed(range(_MOST_TRIES)):
-            triangles = self.surface.arrays.triangles
-            if not self._only_triangles:
-                triangles = mesh_io.triangles_at(self._mesh, vertices)
+            arrays = self.surface.arrays
+            triangles = arrays.triangles if self._only_triangles else mesh_io.triangles_at(self._mesh, vertices)
             try:
                 return vertices, (yield partial(self.certify, vertices, triangles))
             except NotProved as error:
@@ -145,7 +141,6 @@ class Motion:
                     raise
                 refusal = error
             wished = vertices.copy()
-            arrays = self.surface.arrays
             cut_otherwise = arrays.polygons[(triangles != arrays.triangles).any(1)]
             stays = triangles[np.isin(arrays.polygons, cut_otherwise)]
             wished[stays] = self.before[stays]

@@ -10,11 +10,11 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from .. import native, preferences
-from ..job import JobOperator, breathe
+from ..job import JobOperator
 from ..mesh.mesh_io import triangle_count
 from ..operation_settings import threads_setting
 from ..proof import labels, last_run
-from ..reference import measurements, snapshots, tolerances
+from ..reference import measurements, tolerances
 from ..shared.errors import Refused
 from ..shared.files import safe_files
 from ..shared.proof import deviation, deviation_pictures, deviation_units
@@ -22,6 +22,7 @@ from ..shared.surface import Surface
 from ..units import chosen_unit
 from .blocked import allowed, check_blocked
 from .decimate import targets
+from .reading import mesh_and_reference
 
 # The report gives the share of the area in the bands between these shares of the tolerance.
 _BANDS = (0.25, 0.5, 0.75)
@@ -201,10 +202,7 @@ a table (.csv) or all numbers (.json)"""
     def _task(self, context, ob):
         """A generator for steps(): returns the _Task of an object."""
         settings = ob.tolvol
-        surface = snapshots.surface_of(ob)
-        yield breathe
-        reference = snapshots.reference_of(ob, surface)
-        yield breathe
+        surface, reference = yield from mesh_and_reference(ob)
         size = reference.size()
         tolerance = tolerances.required(ob, size)
         of_object = settings.snapshot_kind == "OBJECT" and settings.snapshot_object is not None

@@ -12,7 +12,7 @@ import pytest
 from addon.estimate import memory
 from addon.job import interruptions, run
 from addon.mesh import mesh_io, transfer
-from addon.operators import fit_modifier, reference
+from addon.operators import fit_modifier, lod, reference
 from addon.panels import notes
 from addon.proof import verdict
 from addon.reference import snapshots
@@ -151,7 +151,7 @@ def test_no_mesh_is_made_to_cut_triangles():
         assert bpy.ops.tolvol.smooth() == {"FINISHED"}
 
 
-# What panels read ----------------------------------------------------------------------------------------------------
+# What changes meanwhile ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("work", ("check", "worst_point", "decimate", "smooth"))
@@ -176,6 +176,21 @@ def test_a_mesh_and_its_own_reference_are_at_one_place_although_the_object_moves
     assert getattr(bpy.ops.tolvol, work)() == {"FINISHED"}
     found = verdict.of(ob)
     assert found is None or not found.passed and found.forward.upper > 0.25
+
+
+def test_levels_and_their_reference_are_at_one_place_although_the_object_moves_while_they_are_read(monkeypatch):
+    ob = torus()
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    limits = lod.TOLVOL_OT_make_lods._limits
+
+    def moved(operator, context, size):
+        ob.location.z += 0.3
+        bpy.context.view_layer.update()
+        return limits(operator, context, size)
+
+    monkeypatch.setattr(lod.TOLVOL_OT_make_lods, "_limits", moved)
+    assert bpy.ops.tolvol.make_lods(levels=2) == {"FINISHED"}
+    assert all(verdict.of(level).passed for level in ob.tolvol.lods.objects)
 
 
 def test_a_change_that_blender_does_not_tell_of_is_seen_with_the_next_one():
