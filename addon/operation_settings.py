@@ -287,7 +287,7 @@ def lod_settings(options=frozenset(), in_length=None):
             options=set(options),
         ),
         "in_length": BoolProperty(
-            name="Lengths",
+            name="As Lengths",
             description="Give the tolerances as lengths in the world, and not in percent of the reference's size",
             options=set(options),
             **(in_length or {}),
@@ -297,7 +297,7 @@ def lod_settings(options=frozenset(), in_length=None):
             description="The tolerance of each level, in percent of the reference's size",
             size=MOST_LEVELS,
             default=(0.1, 0.5, 2, 4, 8, 16),
-            min=1e-6,
+            min=1e-5,
             max=100,
             precision=3,
             options=set(options),

@@ -65,7 +65,7 @@ def _sum(objects, percents, settings):
         if curve.too_large:
             return _TOO_LARGE
         if curve.refused(percents[ob.name]):
-            return "Beyond this tolerance"
+            return "No result at this tolerance"
         count = curve.count(percents[ob.name])
         if not count:
             return _AT_WORK

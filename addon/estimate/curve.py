@@ -19,8 +19,9 @@ _FINEST, _COARSEST = _ON_LADDER / STEP**5, _ON_LADDER * STEP**6
 _CLOSE = 1.2
 # Tolerances that differ by a smaller factor count as the same.
 _SAME = 1 + 1e-6
-# Below the tolerance that leaves this share of the triangles, finer ones leave hardly more.
-_NEARLY_ALL = 0.9
+# Below the tolerance that leaves this share of the triangles, finer ones leave hardly more. Those that are finer by the
+# factor may be refused, because float32 cannot hold them.
+_NEARLY_ALL, _FINER = 0.9, 100.0
 # For meshes of more than so many triangles, the ladder goes on towards finer tolerances, which take longer, only while a
 # decimation takes at most so many seconds.
 _LARGE, _PATIENCE = 50_000, 4.0
@@ -51,7 +52,7 @@ class Curve:
     def count(self, tolerance):
         """Returns the estimated number of triangles, or None if it is not known."""
         below, above = self._around(tolerance)
-        if below is None and self._nearly_all():
+        if below is None and self._nearly_all(tolerance):
             return float(self._counts[above])
         if below is None or above is None or self._counts[below] is None or self._counts[above] is None:
             return None
@@ -75,7 +76,7 @@ class Curve:
         below, above = self._around(tolerance)
         if below is not None and above is not None:
             return below == above or self._close(below, above)
-        return self.refused(tolerance) or below is None and self._nearly_all()
+        return self.refused(tolerance) or below is None and self._nearly_all(tolerance)
 
     def missing(self, tolerance):
         """Returns the tolerance, near to the present one, of the next decimation that the whole curve needs, or None."""
@@ -106,7 +107,7 @@ class Curve:
         while rung >= _FINEST / _SAME:
             yield rung
             at, _ = self._around(rung)
-            if not self.exact(rung) or self._counts[at] is None or self._nearly_all():
+            if not self.exact(rung) or self._counts[at] is None or self._nearly_all(rung):
                 return
             if self.triangles > _LARGE and self._seconds[at] > _PATIENCE:
                 return
@@ -120,7 +121,8 @@ class Curve:
             if above / below > _NARROWEST * _SAME and self._counts[below] is not None and not self._close(below, above)
         ]
 
-    def _nearly_all(self):
-        """Whether the finest known tolerance leaves nearly all triangles."""
-        least = self._counts[self._tolerances[0]] if self._tolerances else None
-        return least is not None and least >= _NEARLY_ALL * self.triangles
+    def _nearly_all(self, tolerance):
+        """Whether this tolerance, like the finest known one, leaves nearly all triangles."""
+        finest = self._tolerances[0] if self._tolerances else None
+        least = self._counts.get(finest)
+        return least is not None and least >= _NEARLY_ALL * self.triangles and tolerance > finest / _FINER

@@ -135,7 +135,8 @@ class JobOperator:
         """Whether another run is at work, which is reported."""
         other = under_way()
         if other:
-            self.report({"WARNING"}, f"{other.label} is at work: wait until it ends, or press Esc")
+            # The status bar, which shows other reports, shows the progress. An error has a popup.
+            self.report({"ERROR"}, f"{other.label} is at work: wait until it ends, or press Esc")
         return other is not None
 
     def _asked(self, context):

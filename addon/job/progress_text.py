@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 # The time that a stage still takes is told after so many seconds, and after such a share of the stage.
 _KNOWN_AFTER, _KNOWN_SHARE = 1.0, 0.05
+_MOST = 0.99  # Who reads 100 % believes that the work has ended.
 
 
 class Clock:
@@ -55,7 +56,7 @@ def tell(operator, progress, clock):
         operator.bl_label,
         operator.part,
         stage,
-        share or None,
+        min(share, _MOST) or None,
         f"{_duration(left)} left" if left is not None else "",
         count,
         "Keep Present Result" if operator.improving() else "Discard Result" if progress.finishing else "Cancel",

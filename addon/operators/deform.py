@@ -46,7 +46,10 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
 
     @classmethod
     def poll(cls, context):
-        return allowed(cls, decimate_blocked(context.active_object))
+        ob = context.active_object
+        # Scripts name the lattice when they call the operator.
+        none = not any(other.type == "LATTICE" for other in bpy.data.objects)
+        return allowed(cls, decimate_blocked(ob) or ("Add a lattice first: Add > Lattice" if none else None))
 
     def draw(self, _context):
         self.layout.use_property_split = True
@@ -109,7 +112,7 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
         if self.mode == "BLOCKED" and stopped:
             why, count = stopped
             raise Refused(
-                f"Blocked: {count:,} faces of {name} would {_WOULD[why]}. "
+                f"{count:,} faces of {name} would {_WOULD[why]}. "
                 f"{_permitted(run['permitted_fraction'])}choose Pull Back to hold back only the vertices of these faces"
             )
         if not run["moved"]:

@@ -117,8 +117,8 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             if self._counts(evaluation, trial, len(arrays.triangles)):
                 self._found.append((len(arrays.triangles), value))
                 fewest = min(self._found)[0]
-                than = f", {triangles:,} before the fit" if fewest > triangles else ""
-                self.count = f"{fewest:,} triangles so far, not proved{than}"
+                than = f", {triangles:,} before" if fewest > triangles else ""
+                self.count = f"{fewest:,} triangles, unproved{than}"
         found = sorted(self._found)
         if self.progress.finishing:
             return found

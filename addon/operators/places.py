@@ -3,12 +3,12 @@
 
 import bpy
 from bpy.props import BoolProperty
+from bpy_extras.view3d_utils import region_2d_to_location_3d
 from mathutils import Vector
 
+from ..overlay import legend
 from ..proof import places
-from ..reference import snapshots, tolerances
-from ..shared.proof import report
-from ..units import area, length
+from ..reference import snapshots
 from .blocked import allowed
 from .check import Comparison
 
@@ -16,31 +16,10 @@ from .check import Comparison
 _AROUND = 3.0
 # The eye is never nearer than the first share of the size of the reference, and never farther than the second one: a region
 # may be most of the mesh.
-_LEAST, _MOST = 0.2, 0.7
+_LEAST, _MOST = 0.3, 0.7
 # The view is turned unless the surface at the place looks at the eye at least so much (a cosine).
 _FACING = 0.3
-
-
-def described(context, ob):
-    """Returns what is known about the present place as lines of text, or [] if none is shown."""
-    found, at, regions = places.shown(ob)
-    if not found:
-        return []
-    place = found[at]
-    tolerance = tolerances.tolerance_length(ob.tolvol, snapshots.snapshot_size(ob))
-    where = "the reference" if place.on_reference else "the mesh"
-    lines = [
-        f"{at + 1} of {len(found)}, on {where}: {length(context, place.distance.upper)}, "
-        f"{report.percent(place.distance.upper, tolerance)} of the tolerance"
-    ]
-    if place.beyond:
-        faces = "1 triangle" if place.faces == 1 else f"{place.faces:,} triangles"
-        more = f"; {regions:,} regions in all" if regions > len(found) else ""
-        beyond = f", {area(context, place.area)} of them beyond" if place.area > 0 else ""
-        lines.append(f"Not proved to be within: {faces}{beyond}{more}")
-    else:
-        lines.append("Within the tolerance")
-    return lines
+_CLEAR = 24  # pixels at an interface scale of 1 around a place that the legend leaves free
 
 
 def _frame(context, ob):
@@ -59,6 +38,22 @@ def _frame(context, ob):
     view.view_location = Vector(place.position)
     size = snapshots.snapshot_size(ob)
     view.view_distance = min(max(_AROUND * place.radius, _LEAST * size), _MOST * size)
+    regions = [each for each in context.area.regions if each.type == "WINDOW"] if context.area else []
+    if len(regions) == 1:  # In a quad view, each region looks in another direction.
+        _move_from_legend(context, regions[0], view)
+
+
+def _move_from_legend(context, region, view):
+    """Moves what is in the middle of the 3D view beside the legend, if the legend lies there."""
+    box = legend.box(region)
+    middle = Vector((region.width / 2, region.height / 2))
+    if box is None or not legend.reaches(box, middle, _CLEAR * context.preferences.system.ui_scale):
+        return
+    left, right, _ = legend.free_part(context, region)
+    before, after = (left + box[0]) / 2, (box[0] + box[2] + right) / 2
+    beside = Vector((before if box[0] - left >= right - box[0] - box[2] else after, middle.y))
+    view.update()
+    view.view_location += view.view_location - region_2d_to_location_3d(region, view, beside, view.view_location)
 
 
 class TOLVOL_OT_worst_point(Comparison, bpy.types.Operator):
@@ -78,7 +73,9 @@ and bring the one with the largest distance into view"""
         self.remember(surface, found)
         places.show(self.ob, of_mesh, regions)
         _frame(context, self.ob)
-        self.say({"INFO" if found.passed else "WARNING"}, f"{found.word}: {'. '.join(described(context, self.ob))}")
+        self.say(
+            {"INFO" if found.passed else "WARNING"}, f"{found.word}: {'. '.join(places.described(context, self.ob))}"
+        )
 
 
 class TOLVOL_OT_next_place(bpy.types.Operator):
@@ -101,7 +98,7 @@ class TOLVOL_OT_next_place(bpy.types.Operator):
     def execute(self, context):
         places.step(-1 if self.back else 1)
         _frame(context, context.active_object)
-        self.report({"INFO"}, ". ".join(described(context, context.active_object)))
+        self.report({"INFO"}, ". ".join(places.described(context, context.active_object)))
         return {"FINISHED"}
 
 

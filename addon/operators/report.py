@@ -185,7 +185,7 @@ a table (.csv) or all numbers (.json)"""
             certified = {way: run[way]["largest"] for way in ("forward", "backward")}
             share = next(entry["share"] for entry in run["forward"]["beyond"] if entry["bound"] == task.tolerance)
             measurements.remember(ob, task.surface, certified, task.tolerance, share)
-        self.say({"INFO"}, f"{document['verdict']}: saved {self._target.name}")
+        self.say({"INFO"}, f"Saved {self._target.name}: {document['verdict']}")
 
     def _prepare_file(self):
         """Refuses before the work begins what could not be written at its end."""

@@ -35,7 +35,7 @@ def draw(context, page, taken):
         else:
             share = report.percent(found.distance, tolerance_of(ob))
             lines = [f"{i + 1}: {distance_text(context, found)}, {share}"]
-        _dot(page, *spot)
+        _dot(page, *spot, taken)
         # Where the lines have no room, the number alone is drawn, and where that has none, the dot.
         for box in (markers.Box(page, lines), markers.Box(page, [f"{i + 1}"])):
             if place := box.beside(context, *spot, _BESIDE * page.scale, taken):
@@ -51,11 +51,15 @@ def draw_hover(context, page, hover, taken):
     if hover.position is not None:
         spot = markers.in_view(context, hover.position)
         if spot is not None:
-            _dot(page, *spot)
+            _dot(page, *spot, taken)
     markers.Box(page, hover.lines).draw_beside(context, *hover.mouse, 2 * _BESIDE * page.scale, taken)
 
 
-def _dot(page, x, y):
+def _dot(page, x, y, taken):
+    """Draws a dot at a place, unless it would cover text there."""
+    reach = _DOT / 2 * page.scale
+    if any(markers.overlap((x - reach, y - reach, 2 * reach, 2 * reach), other) for other in taken):
+        return
     for size, colour in ((_DOT + 2, markers.EDGE), (_DOT, markers.INK)):
         size *= page.scale
         page.rectangle(x - size / 2, y - size / 2, size, size, shaders.FLAT, colour)

@@ -288,6 +288,12 @@ def box(region):
     return _boxes.get(region.as_pointer())
 
 
+def reaches(box, spot, clear):
+    """Whether a legend comes nearer to a spot of the region, along both axes, than `clear` pixels. box: as box() returns it."""
+    left, bottom, width, height = box
+    return left - clear < spot[0] < left + width + clear and bottom - clear < spot[1] < bottom + height + clear
+
+
 def forget_box(region):
     """Notes that a region is about to be drawn anew: it may have no legend then."""
     _boxes[region.as_pointer()] = None

@@ -4,7 +4,6 @@
 import gpu
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 
-from ..operators.places import described
 from ..proof import places
 from . import legend, shaders
 
@@ -35,7 +34,7 @@ def draw(context, page, taken):
                 _cross(page, *spot, arm)
     if spots[at] is None:
         return None
-    box = Box(page, described(context, ob))
+    box = Box(page, places.described(context, ob))
     if box.covers_much(context):
         box = Box(page, [f"{at + 1} of {len(found)}"])
     return box.draw_beside(context, *spots[at], 2 * _PRESENT_ARM * page.scale, taken)

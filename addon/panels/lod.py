@@ -35,7 +35,6 @@ _NAME = 0.36  # the part of a row that is for the name of a level
 def _draw_level(context, column, made, i):
     """Draws the name of a level, its triangles and its deviation, which has a row of its own in a narrow sidebar."""
     narrow = is_narrow(context)
-    # The object itself, which is the first level, may have a long name.
     row = column.row() if narrow or not i else column.split(factor=_NAME)
     if i < len(made):
         level = made[i]
@@ -52,6 +51,9 @@ def _draw_level(context, column, made, i):
     if narrow:
         right(row, triangles)
         right(column, deviation)
+    elif not i:
+        # The object itself, which is the first level, may have a long name: the numbers have a row of their own.
+        right(column, f"{triangles}  {deviation}")
     else:
         # Two labels would leave each other too little room.
         right(row, f"{triangles}  {deviation}")

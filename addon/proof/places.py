@@ -12,8 +12,9 @@ import numpy as np
 from .. import native
 from ..reference import measurements, snapshots, tolerances
 from ..shared import volumes
-from ..shared.proof import certify, measure
+from ..shared.proof import certify, measure, report
 from ..shared.proof.verdict import Interval
+from ..units import area, length
 from . import regions
 
 # So many places are measured in each direction; further regions are counted.
@@ -219,6 +220,28 @@ def shown(ob):
     if not _places or ob is None or ob.name != _name or _state != _state_of(ob):
         return [], 0, 0
     return _places, _at, _regions_found
+
+
+def described(context, ob):
+    """Returns what is known about the present place as lines of text, or [] if none is shown."""
+    found, at, regions = shown(ob)
+    if not found:
+        return []
+    place = found[at]
+    tolerance = tolerances.tolerance_length(ob.tolvol, snapshots.snapshot_size(ob))
+    where = "the reference" if place.on_reference else "the mesh"
+    lines = [
+        f"{at + 1} of {len(found)}, on {where}: {length(context, place.distance.upper)}, "
+        f"{report.percent(place.distance.upper, tolerance)} of the tolerance"
+    ]
+    if place.beyond:
+        faces = "1 triangle" if place.faces == 1 else f"{place.faces:,} triangles"
+        more = f"; {regions:,} regions in all" if regions > len(found) else ""
+        beyond = f", of which {area(context, place.area)} are beyond" if place.area > 0 else ""
+        lines.append(f"Not proved to be within: {faces}{beyond}{more}")
+    else:
+        lines.append("Within the tolerance")
+    return lines
 
 
 def _state_of(ob):

@@ -6,9 +6,9 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from .. import preferences
 
-# How a length above 0 is entered.
+# How a length above 0 is entered. Dragging stops at the soft ends, and typing does not.
 # Blender 3.4 makes of this step one of a millimetre: for a pixel of dragging, or a click on an arrow.
-LENGTH = {"min": 1e-12, "soft_max": 1.0, "step": 0.01, "precision": 4, "subtype": "DISTANCE"}
+LENGTH = {"min": 1e-12, "soft_min": 1e-5, "soft_max": 1.0, "step": 0.01, "precision": 4, "subtype": "DISTANCE"}
 
 TOLERANCE_UNITS = (
     ("PERCENT", "% of Size", "Percent of the longest diagonal of the reference's bounding box"),
@@ -39,7 +39,7 @@ def tolerance_settings(options=frozenset(), unit=None, percent=None, length=None
         ),
         "tolerance_length": FloatProperty(
             name="Tolerance",
-            description="How far the mesh may lie from the reference",
+            description="How far the mesh may lie from the reference. Hold Shift to drag in fine steps",
             default=0.01,
             **LENGTH,
             options=set(options),
@@ -72,7 +72,7 @@ PLACEMENTS = (
 
 
 DEFORM_MODES = (
-    ("BLOCKED", "Block", "Change nothing and report which share of the deformation the tolerance permits"),
+    ("BLOCKED", "Stop", "Change nothing and report which share of the deformation the tolerance permits"),
     (
         "FARTHEST",
         "As Far as Permitted",

@@ -1,21 +1,31 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "check/input_checks.h"
 
+#include <cmath>
+#include <iomanip>
 #include <sstream>
 
 #include "base/errors.h"
 
 namespace tolvol {
 
+/// More of the tolerance than this share is not left to rounding.
+constexpr double most_rounding = 0.5;
+
 std::optional<std::string> storage_warning(const ToleranceVolume& volume, const StoredSpace& space,
                                            std::span<const glm::dvec3> stored) {
   const double share = space.storage_step(stored) / volume.frame_tolerance();
   std::ostringstream text;
-  text << "at these coordinates the stored type rounds positions by up to " << 100 * share << " % of the tolerance; "
-       << "move the mesh nearer to its origin or take a larger tolerance";
-  if (share > 0.5) throw InvalidInput(text.str(), "tolerance_too_small");
-  if (share > 0.01) return text.str();
-  return std::nullopt;
+  if (share > most_rounding) {
+    // The frame's tolerance leaves a little out for the mapping to the world. A tenth more makes up for that.
+    text << "the tolerance is too small for coordinates of this size and type, which are rounded: take at least "
+         << std::ceil(11 * share / most_rounding) / 10 << " times this tolerance, or move the mesh nearer to its origin";
+    throw InvalidInput(text.str(), "tolerance_too_small");
+  }
+  if (share <= 0.01) return std::nullopt;
+  text << "coordinates of this size and type are rounded by up to " << std::setprecision(2) << 100 * share
+       << " % of the tolerance; move the mesh nearer to its origin, or take a larger tolerance";
+  return text.str();
 }
 
 void refuse_outside(const FaceCount& outside) {

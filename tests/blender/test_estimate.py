@@ -11,6 +11,7 @@ import pytest
 from addon import estimate, job, native
 from addon.background import queue
 from addon.estimate import known, runs
+from addon.mesh import mesh_io
 from scenes import activate, add_object, sheet, sheet_arrays, torus
 
 
@@ -212,12 +213,22 @@ def test_several_objects_are_estimated_together():
     assert estimate.shown(bpy.context) == estimate.Estimate(answer.before, answer.after, True)
 
 
+def test_a_tolerance_that_float32_cannot_hold_is_refused_although_nearly_all_triangles_stay():
+    ob = torus()
+    ob.data.vertices.foreach_set("co", mesh_io.column(ob.data.vertices, "co", 3).ravel() + np.float32(100))
+    ob.data.update()
+    ob.tolvol.tolerance_percent = 0.01
+    assert drawn().after > 0.9 * 2304
+    ob.tolvol.tolerance_percent = 1e-5
+    assert drawn() == "No result at this tolerance"
+
+
 def test_what_is_refused_is_said(monkeypatch):
     ob = sheet(bumps=0.0)
     bpy.ops.tolvol.set_reference()
     ob.data.vertices[0].co.z += 0.1
     ob.data.update()
-    assert drawn() == "Beyond this tolerance"
+    assert drawn() == "No result at this tolerance"
     ob.tolvol.tolerance_percent = 20
     assert is_known(drawn(until=is_known))
     ob.tolvol.vertex_group = "nowhere"

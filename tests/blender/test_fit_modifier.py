@@ -251,7 +251,7 @@ def test_a_fit_that_leaves_more_triangles_says_so_while_it_searches_and_afterwar
     monkeypatch.setattr(Run, "_next_work", lambda self: (each(self), told.append(self.operator.count))[0])
     assert bpy.ops.tolvol.fit_modifier() == {"FINISHED"}
     left = len(world_triangles(ob)[1])
-    assert left > 100 and f"{left:,} triangles so far, not proved, 12 before the fit" in told
+    assert left > 100 and f"{left:,} triangles, unproved, 12 before" in told
     more = f"Boxes leaves {left:,} triangles, more than the 12 that there were: undo it unless its new faces are wanted"
     fewer = f"The button Decimate leaves fewer triangles within this tolerance: 12, and the modifier Boxes {left:,}"
     assert kept_warnings.of(ob)[0] == [more, fewer]
@@ -291,7 +291,7 @@ def test_the_fewest_triangles_are_told_until_the_fit_ends(monkeypatch):
     first = next(i for i, (_, said) in enumerate(told) if said)
     assert "Comparing with Decimate" in [doing for doing, _ in told[:first]]
     searching = [said for _, said in told[first:]]
-    assert all(searching) and searching[0].endswith(" triangles so far, not proved") and searching[-1] == count
+    assert all(searching) and searching[0].endswith(" triangles, unproved") and searching[-1] == count
 
 
 def test_a_value_that_is_given_is_certified_and_not_searched_for():

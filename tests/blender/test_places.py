@@ -67,7 +67,7 @@ def test_the_view_shows_a_place_from_near_although_its_region_is_most_of_the_mes
     changed(ob)
     assert bpy.ops.tolvol.worst_point() == {"FINISHED"}
     view = SimpleNamespace(view_perspective="PERSP", view_rotation=Quaternion(), lock_rotation=False)
-    context = SimpleNamespace(space_data=SimpleNamespace(type="VIEW_3D", region_3d=view))
+    context = SimpleNamespace(space_data=SimpleNamespace(type="VIEW_3D", region_3d=view), area=None)
     operators._frame(context, ob)
     place, size = places.shown(ob)[0][0], snapshots.snapshot_size(ob)
     assert place.radius > 0.4 * size and view.view_distance == pytest.approx(0.7 * size)
@@ -186,7 +186,7 @@ def test_more_regions_than_are_measured_are_counted(monkeypatch):
     assert bpy.ops.tolvol.worst_point() == {"FINISHED"}
     found, _, regions = places.shown(ob)
     assert [round(place.distance.upper, 3) for place in found] == [0.3, 0.22] and regions == 3
-    assert "3 regions in all" in operators.described(bpy.context, ob)[1]
+    assert "3 regions in all" in places.described(bpy.context, ob)[1]
 
 
 def test_next_and_previous_go_around(capfd):

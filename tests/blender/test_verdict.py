@@ -93,7 +93,7 @@ def test_check_report_and_select_outside_say_the_same(tolerance, word, tmp_path,
     assert f"{word}: " in capfd.readouterr().out and verdict.word(ob) == word
     for extension in ("json", "csv", "html"):
         assert bpy.ops.tolvol.save_report(filepath=str(tmp_path / f"report.{extension}")) == {"FINISHED"}
-        assert f"{word}: saved" in capfd.readouterr().out
+        assert f"/report.{extension}: {word}" in capfd.readouterr().out
     assert json.loads((tmp_path / "report.json").read_text())["verdict"] == word
     rows = list(csv.reader(io.StringIO((tmp_path / "report.csv").read_text())))
     assert ["", "verdict", "", word, "", ""] in rows

@@ -145,7 +145,10 @@ REFUSALS = (
     ("all faces are degenerate", _has_no_area),
     ("the domain of the lattice", lambda case: case.size() == 0),
     ("larger than the reference|single point|one point|no size", _is_a_point),
-    ("the stored type rounds", lambda case: _rounds(case, 2.0**-24 if case.vertices.dtype == np.float32 else 2.0**-53)),
+    (
+        "too small for coordinates",
+        lambda case: _rounds(case, 2.0**-24 if case.vertices.dtype == np.float32 else 2.0**-53),
+    ),
     ("too small for double precision", lambda case: _rounds(case, 2.0**-45)),
     (
         "faces (of the reference )?are not within the tolerance",

@@ -37,9 +37,7 @@ def test_escape_keeps_the_best_so_far():
     reference = scenes.world_triangles(suzanne())
     said = status_texts()
     fit(suzanne())
-    yield from finished(
-        lambda: said and "triangles so far, not proved    Esc: Keep Present Result" in said[-1], pause=0.02
-    )
+    yield from finished(lambda: said and "triangles, unproved    Esc: Keep Present Result" in said[-1], pause=0.02)
     key("Escape")
     yield from finished(lambda: not suzanne().modifiers)
     assert_proved(suzanne(), reference, 0.2)
@@ -52,7 +50,7 @@ def test_escape_keeps_more_triangles_than_before_and_says_so():
     ob.tolvol.tolerance_percent = 1
     reference = scenes.world_triangles(ob)
     fit(ob, "REMESH")
-    yield from finished(lambda: said and ", 12 before the fit    Esc: Keep Present Result" in said[-1], pause=0.02)
+    yield from finished(lambda: said and ", 12 before    Esc: Keep Present Result" in said[-1], pause=0.02)
     key("Escape")
     yield from finished(lambda: not ob.modifiers)
     left = len(scenes.world_triangles(ob)[1])

@@ -9,7 +9,7 @@ from mathutils import Vector
 import scenes
 from addon import panels
 from addon.mesh import mesh_io
-from addon.overlay import annotations
+from addon.overlay import annotations, legend
 from addon.panels import notes
 from addon.proof import kept_warnings, places
 from panels_open import alone
@@ -98,6 +98,32 @@ def test_worst_point_next_and_previous_by_mouse():
     assert view()[1].spaces[0].region_3d.view_distance < 10
     with window_context():
         bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_the_worst_point_lies_beside_the_legend_where_that_covers_the_middle():
+    yield from reset(ball)
+    with alone(panels.TOLVOL_PT_deviation):
+        yield from open_tab()
+        the_ball().tolvol.show_deviation = True
+        area = region("WINDOW")
+        yield from finished(lambda: legend.box(area))
+        with window_context():
+            _, _, width, height = legend.box(area)
+            legend.move(bpy.context, (area.width - width) / 2, (area.height - height) / 2)
+            bpy.context.area.tag_redraw()
+        yield from at_rest()
+        yield from press("tolvol.worst_point", across=0.25)
+        yield from finished(lambda: places.shown(the_ball())[0])
+        yield from at_rest()
+        screenshot("worst point beside the legend")
+    box, ob = legend.box(area), the_ball()
+    found, at, _ = places.shown(ob)
+    spot = location_3d_to_region_2d(area, view()[1].spaces[0].region_3d, Vector(found[at].position))
+    with window_context():
+        left, right, _ = legend.free_part(bpy.context)
+        legend.forget_moved()
+    assert box[0] < area.width / 2 < box[0] + box[2] and left < spot.x < right
+    assert not legend.reaches(box, spot, 20) and abs(spot.y - area.height / 2) < 5
 
 
 def test_warnings_stay_in_the_panel_and_select_their_vertices():

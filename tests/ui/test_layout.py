@@ -106,6 +106,10 @@ def _no_button_moves(operator, *buttons):
         yield
         screenshot(f"layout 9 during {operator}")
         assert (yield from rows(*buttons)) == before and job.under_way()
+        if operator == "smooth":
+            yield from press("tolvol.smooth")
+            yield
+            screenshot("layout 9 second job")
         released.append(True)
     yield from finished(lambda: not job.under_way())
     assert (yield from rows(*buttons)) == before
