@@ -135,8 +135,9 @@ class JobOperator:
         """Whether another run is at work, which is reported."""
         other = under_way()
         if other:
-            # The status bar, which shows other reports, shows the progress. An error has a popup.
-            self.report({"ERROR"}, f"{other.label} is at work: wait until it ends, or press Esc")
+            # The status bar, which shows other reports, shows the progress, and a popup would take Esc.
+            other.ask_to_wait()
+            self.report({"WARNING"}, f"{other.label} is at work: wait until it ends, or press Esc")
         return other is not None
 
     def _asked(self, context):

@@ -20,6 +20,7 @@ PATIENCE = 0.1
 # So long after its beginning the status bar shows a job, so that no line flashes up for a short one.
 _QUIET = 0.4
 _TICK = 0.1
+_ASKS = 4.0  # seconds, in which the words are read that another operator has to wait
 
 # steps() of an operator yields this in place of work once nothing is left to do but to change Blender's data.
 WRITE = object()
@@ -57,15 +58,19 @@ class Run:
         self._breathes = False  # whether the present job is breathe()
         self._edited = False  # whether Blender has reported a change of a mesh since the last call of take_edited()
         self._seen = None  # what the status bar and the sidebars were told last
-        self._began = time.monotonic()
+        self._began, self._asked_to_wait = time.monotonic(), -_ASKS
 
     def told(self):
         """Returns what is known about the work, for the panel and the status bar."""
-        return (
-            progress_text.stopping(self.label)
-            if self._gone()
-            else progress_text.tell(self.operator, self.progress, self._clock)
-        )
+        if self._gone():
+            return progress_text.stopping(self.label)
+        told = progress_text.tell(self.operator, self.progress, self._clock)
+        asked = told.escape and time.monotonic() < self._asked_to_wait + _ASKS
+        return replace(told, count="Wait for the end, or press Esc") if asked else told
+
+    def ask_to_wait(self):
+        """Lets the panel and the status bar say for a while that another operator has to wait."""
+        self._asked_to_wait = time.monotonic()
 
     def _gone(self):
         """Whether Blender has freed the operator. It keeps the last 32, and may free one that Adjust Last Operation repeats."""
@@ -138,10 +143,20 @@ class Run:
         return {"RUNNING_MODAL"}
 
     def on_event(self, context, event):
+        try:
+            ended = self._ended_by(context, event)
+        except BaseException:
+            self._leave(context)  # Blender sends no more events after an error.
+            raise
+        if ended & {"FINISHED", "CANCELLED"}:
+            self._leave(context)
+        return ended
+
+    def _ended_by(self, context, event):
+        """Goes on by an event. Returns the operator's result, or what becomes of the event while there is none."""
         if self.interrupted is None:
             self._look()
         if self.interrupted is not None:
-            self._leave(context)
             if self.interrupted:
                 self.voice.report({"WARNING"}, self.interrupted)
             return {"CANCELLED"}
@@ -160,15 +175,8 @@ class Run:
     def _on_timer(self, context):
         # An undo step of one mode does not hold a change that is made in another: the outcome waits until the mode is back.
         waits = context.mode != self._mode
-        if not waits:
-            try:
-                ended = self.go_on(_TICK) if self._ready() else None
-            except BaseException:
-                self._leave(context)
-                raise
-            if ended:
-                self._leave(context)
-                return ended
+        if not waits and self._ready() and (ended := self.go_on(_TICK)):
+            return ended
         if waits or time.monotonic() >= self._began + _QUIET:
             told = self.told()
             status = progress_text.status_line(told) + (

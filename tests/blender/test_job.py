@@ -291,6 +291,20 @@ def test_all_events_but_esc_are_passed_on(waiting):
     assert operator.said == "Modal was cancelled. It has changed nothing"
 
 
+@pytest.mark.parametrize("kind", ("ESC", "TIMER", "MOUSEMOVE"))
+def test_an_error_while_an_event_is_handled_ends_the_run(waiting, monkeypatch, kind):
+    operator, _ = waiting
+
+    def fail(*_):
+        raise RuntimeError("unexpected")
+
+    monkeypatch.setattr(Run, "_look", fail)
+    context = Context()
+    with pytest.raises(RuntimeError, match="unexpected"):
+        operator.modal(context, event(kind))
+    assert not interruptions.runs and len(context.removed) == 1
+
+
 def test_an_outcome_waits_until_the_mode_is_that_of_the_start(waiting, monkeypatch):
     texts = []
     monkeypatch.setattr(status_bar, "show", texts.append)
@@ -323,6 +337,7 @@ def test_a_second_job_waits_for_the_first(waiting):
     second = type("Second", (Modal,), {"__init__": lambda self: None})()
     assert second.invoke(None, None) == {"CANCELLED"}
     assert second.said == "Modal is at work: wait until it ends, or press Esc"
+    assert waiting[0]._run.told().count == "Wait for the end, or press Esc"
 
 
 class Progress:
