@@ -54,6 +54,7 @@ PYBIND11_MODULE(_native, module) {
   tolvol::python::bind_measure(module);
   tolvol::python::bind_topology(module);
   tolvol::python::bind_repair(module);
+  tolvol::python::bind_list_rows(module);
   tolvol::python::bind_picture(module);
   refuse_uninitialised_objects(module);
   module.attr("__name__") = name;

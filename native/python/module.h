@@ -19,6 +19,7 @@ void bind_deformation(pybind11::module_& module);
 void bind_measure(pybind11::module_& module);
 void bind_topology(pybind11::module_& module);
 void bind_repair(pybind11::module_& module);
+void bind_list_rows(pybind11::module_& module);
 void bind_picture(pybind11::module_& module);
 
 }  // namespace tolvol::python

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 import tolvol
 import trimesh
-from tolvol.command import mesh_files, polygons
+from tolvol.command import mesh_files, plain_formats, polygons
 from tolvol.command.mesh import Attribute, Mesh, joined, weld
 from tolvol.shared.errors import Refused
+from tolvol.shared.files import ply_file, stl_file
 
 import meshes
 from commands import command, read, scan, succeeded, write
@@ -98,6 +99,82 @@ def test_all_forms_of_ply(tmp_path, form):
     assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
     colours = mesh.attributes["colours"]
     assert colours.values.dtype == np.uint8 and colours.values[:, 0].tolist() == [0, 10, 20, 30]
+
+
+@pytest.mark.parametrize("order", "<>")
+@pytest.mark.parametrize("lengths", ["333", "444", "345", "3343"], ids=["triangles", "quads", "mixed", "one quad"])
+@pytest.mark.parametrize("counted, index", [("uchar", "int"), ("uint", "uint"), ("char", "short"), ("ushort", "uchar")])
+@pytest.mark.parametrize("extra", [False, True])
+def test_lists_of_any_type_among_other_numbers(order, lengths, counted, index, extra):
+    codes = {"uchar": "B", "char": "b", "ushort": "H", "short": "h", "uint": "I", "int": "i"}
+    sizes = [int(length) for length in lengths]
+    faces = [[(7 * i + k) % 12 for k in range(size)] for i, size in enumerate(sizes)]
+    points = np.random.default_rng(1).normal(size=(12, 3)).astype("f4")
+    before, after = ("property short before\n", "property list uchar float texcoord\n") if extra else ("", "")
+    quality = [100 - i for i in range(12)]
+    head = (
+        f"ply\nformat binary_{'little' if order == '<' else 'big'}_endian 1.0\nelement vertex 12\n"
+        "property double ignored\nproperty float x\nproperty float y\nproperty float z\nproperty char quality\n"
+        f"element face {len(faces)}\n{before}property list {counted} {index} vertex_indices\n{after}end_header\n"
+    )
+    body = b"".join(struct.pack(order + "d3fb", 0.5, *point, value) for point, value in zip(points, quality))
+    for face in faces:
+        row = struct.pack(order + codes[counted], len(face)) + struct.pack(f"{order}{len(face)}{codes[index]}", *face)
+        if extra:
+            row = (
+                struct.pack(order + "h", -2)
+                + row
+                + struct.pack(f"{order}B{2 * len(face)}f", 2 * len(face), *face, *face)
+            )
+        body += row
+    found = ply_file.read(head.encode() + body)
+    assert np.array_equal(found.vertices, points) and found.vertices.dtype == np.float32
+    assert found.corners.tolist() == sum(faces, []) and found.faces == len(faces)
+    assert found.sizes == sizes[0] if len(set(sizes)) == 1 else found.sizes.tolist() == sizes
+    assert found.columns["quality"].tolist() == quality and bool(found.others) == extra
+    for cut in (1, 9, len(row)):
+        with pytest.raises(Refused, match="the file ends inside its list of face elements"):
+            ply_file.read(head.encode() + body[:-cut])
+    with pytest.raises(Refused, match="2 bytes are left"):
+        ply_file.read(head.encode() + body + b"ab")
+
+
+@pytest.mark.parametrize("counted, code, length", [("char", "b", -1), ("uint", "I", 2**32 - 1), ("float", "f", 2.5)])
+def test_a_list_of_an_impossible_length_is_refused_before_it_takes_memory(counted, code, length):
+    head = (
+        "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    )
+    head += f"element face 2\nproperty list {counted} int vertex_indices\nend_header\n"
+    body = bytes(36) + struct.pack(f"<{code}3i", 3, 0, 1, 2) + struct.pack(f"<{code}3i", length, 0, 1, 2)
+    with pytest.raises(Refused, match="the file ends inside its list of face elements"):
+        ply_file.read(head.encode() + body)
+
+
+def test_vertices_with_lists_of_different_lengths_keep_their_numbers():
+    head = (
+        "ply\nformat binary_big_endian 1.0\nelement vertex 4\nproperty float x\nproperty list uchar short tags\n"
+        "property float y\nproperty float z\nproperty uchar quality\nend_header\n"
+    )
+    points = np.random.default_rng(1).normal(size=(4, 3)).astype("f4").tolist()
+    body = b"".join(struct.pack(f">fB{i}h2fB", x, i, *range(i), y, z, 9 * i) for i, (x, y, z) in enumerate(points))
+    found = ply_file.read(head.encode() + body)
+    assert found.vertices.tolist() == points
+    assert {name: column.tolist() for name, column in found.columns.items()} == {"quality": [0, 9, 18, 27]}
+
+
+def test_stl_holds_the_corners_and_normals_of_all_triangles(tmp_path, monkeypatch):
+    monkeypatch.setattr(plain_formats, "_BLOCK", 5)  # The triangles of the box are written in three parts.
+    vertices, triangles = meshes.box()
+    triangles = np.concatenate([triangles, [[0, 0, 1]]])
+    mesh_files.write(tmp_path / "a.stl", [Mesh("a", vertices, triangles)], tmp_path)
+    data = (tmp_path / "a.stl").read_bytes()
+    rows = np.frombuffer(data, stl_file.TRIANGLE, offset=84)
+    assert struct.unpack_from("<I", data, 80) == (13,) and np.array_equal(
+        rows["corners"], vertices[triangles].astype("f4")
+    )
+    outwards = rows["corners"].mean(1) - vertices.mean(0)
+    assert ((rows["normal"] * outwards).sum(1)[:12] > 0).all() and not rows["normal"][12].any()
+    assert np.allclose(np.linalg.norm(rows["normal"][:12], axis=1), 1)
 
 
 def test_stl_as_text_is_welded_and_says_so(tmp_path):
@@ -273,6 +350,28 @@ def test_joining_leaves_out_what_not_all_have():
 def area(points, found):
     one, two, three = (points[found[:, k]] for k in range(3))
     return np.cross(two - one, three - one)[:, 2] / 2
+
+
+@pytest.mark.parametrize("block", [1, 3, polygons._BLOCK])
+def test_each_polygon_among_others_is_cut_as_it_is_alone(monkeypatch, block):
+    monkeypatch.setattr(polygons, "_BLOCK", block)
+    random = np.random.default_rng(1)
+    sizes = random.integers(1, 7, 60)
+    # The corners of each polygon are in order around a centre, at distances by which many polygons have dents.
+    angles = np.concatenate([np.sort(random.random(size)) * 2 * np.pi for size in sizes])
+    away = random.uniform(0.1, 1, len(angles))
+    vertices = np.stack([away * np.cos(angles), away * np.sin(angles), np.zeros(len(angles))], 1)
+    corners, ends = np.arange(len(angles), dtype=np.int32), np.cumsum(sizes)
+    places, of = polygons.triangulated(vertices, corners, sizes)
+    alone = [
+        end - size + polygons.triangulated(vertices, corners[end - size : end], np.array([size]))[0]
+        for size, end in zip(sizes, ends)
+    ]
+    assert places.tolist() == np.concatenate(alone).tolist()
+    assert of.tolist() == np.repeat(np.arange(60), np.maximum(sizes - 2, 0)).tolist()
+    quads = np.flatnonzero(sizes == 4)
+    second = places[np.searchsorted(of, quads) + 1, 0] - (ends - sizes)[quads]
+    assert set(second.tolist()) == {0, 1}  # with and without a dent at the cut from the first corner to the third
 
 
 @pytest.mark.parametrize(

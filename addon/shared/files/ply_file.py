@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads and checks PLY files, by NumPy where all lists of an element have the same length."""
+"""Reads and checks PLY files: by NumPy where all lists of an element have the same length, else by tolvol.list_rows()."""
 
 import re
-import struct
 
 import numpy as np
 
+from .. import package
 from ..errors import Refused
 from .content import Content, are_whole, numbers, require_finite, require_indices
 
@@ -27,11 +27,11 @@ _BLANK = b" \t\r\n\0"  # Some programs end a file with an empty line, or fill it
 def read(data):
     """Returns the Content of a file."""
     form, elements, start = header(data)
-    body = data[start:]
+    body = memoryview(data)[start:]
     wide = any(name == "vertex" and ("x", None, "f8") in properties for name, _, properties in elements)
     order = byte_order(form)
     if form == "ascii":  # The text is turned into a binary body of doubles, so that one reader serves both forms.
-        found = numbers(body, np.float64)
+        found = numbers(data[start:], np.float64)
         if found is None:
             raise Refused("the text after its PLY header holds something that is not a number")
         body = found.astype("<f8").tobytes()
@@ -44,8 +44,8 @@ def read(data):
     for name, count, properties in elements:
         try:
             rows, offset = _ply_element(body, offset, count, properties, order)
-        # int() raises OverflowError if a list has an infinite length.
-        except (ValueError, OverflowError, struct.error):
+        # int() raises OverflowError if a list has an infinite length. InvalidInput is a ValueError.
+        except (ValueError, OverflowError):
             raise Refused(f"the file ends inside its list of {name} elements") from None
         if name == "vertex":
             if not all(_is_column(rows.get(axis)) for axis in "xyz"):
@@ -178,36 +178,6 @@ def _ply_element(body, offset, count, properties, order):
         return {field: rows[field] for field, _, _ in properties}, offset + dtype.itemsize * count
     if not lists:
         raise ValueError
-    return _ply_ragged(body, offset, count, properties, order)
-
-
-def _ply_ragged(body, offset, count, properties, order):
-    """Does the work of _ply_element row by row, for lists of different lengths. A row takes about 2 us."""
-    found = {field: ([], []) for field, _, _ in properties}
-    readers = [
-        (
-            *found[field],
-            counted and struct.Struct(order + np.dtype(counted).char),
-            np.dtype(kind).char,
-            np.dtype(kind).itemsize,
-        )
-        for field, counted, kind in properties
-    ]
-    for _ in range(count):
-        for values, lengths, counted, kind, size in readers:
-            length = 1
-            if counted:
-                declared = counted.unpack_from(body, offset)[0]
-                length = int(declared)
-                if length != declared:
-                    raise ValueError
-                offset += counted.size
-                lengths.append(length)
-            values += struct.unpack_from(f"{order}{length}{kind}", body, offset)
-            offset += length * size
-    rows = {}
-    for field, counted, kind in properties:
-        values, lengths = found[field]
-        column = np.array(values, kind)
-        rows[field] = (column, np.array(lengths, np.int64)) if counted else column
-    return rows, offset
+    types = [(counted and order + counted, order + kind) for _, counted, kind in properties]
+    columns, end = package.module.list_rows(body, count, types, offset=offset)
+    return {field: column for (field, _, _), column in zip(properties, columns)}, end

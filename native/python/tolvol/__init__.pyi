@@ -366,6 +366,13 @@ class HausdorffResult:
     def backward(self) -> DirectedHausdorffResult: ...
 
 def weld(vertices: _Vertices, *, threads: int | None = None) -> tuple[NDArray[np.floating[Any]], NDArray[np.int32]]: ...
+def list_rows(
+    data: bytes | memoryview,
+    count: int,
+    types: Sequence[tuple[str | None, str]],
+    *,
+    offset: int = 0,
+) -> tuple[list[NDArray[Any] | tuple[NDArray[Any], NDArray[np.int64]]], int]: ...
 def crossing_pairs(
     vertices: _Vertices,
     triangles: _Integers,

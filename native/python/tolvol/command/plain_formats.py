@@ -13,6 +13,7 @@ EXTENSIONS = (".obj", ".off", ".ply", ".stl")
 HOLDS = {".obj": ("UVs", "normals", "colours"), ".off": (), ".ply": ("normals", "colours", "UVs"), ".stl": ()}
 
 _UVS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+_BLOCK = 1 << 13  # triangles of an STL file that are written at once, because they stay in the cache
 _NORMALS, _COLOURS = ("nx", "ny", "nz"), ("red", "green", "blue", "alpha")
 
 
@@ -99,16 +100,21 @@ def _ply(path, mesh):
 
 
 def _stl(path, mesh):
-    corners = mesh.vertices[mesh.triangles].astype(np.float32)
+    with open(path, "wb") as file:
+        file.write(b"Tolerance Volumes".ljust(80))
+        file.write(np.uint32(len(mesh.triangles)).tobytes())
+        for first in range(0, len(mesh.triangles), _BLOCK):
+            file.write(_facets(mesh.vertices[mesh.triangles[first : first + _BLOCK]].astype(np.float32)))
+
+
+def _facets(corners):
+    """Returns the rows of an STL file for triangles, (m, 3, 3) float32. The normal of one without an area is zero."""
     rows = np.zeros(len(corners), stl_file.TRIANGLE)
     wide = corners.astype(np.float64)
     normals = np.cross(wide[:, 1] - wide[:, 0], wide[:, 2] - wide[:, 0])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     rows["corners"], rows["normal"] = corners, np.divide(normals, length, where=length > 0, out=np.zeros_like(normals))
-    with open(path, "wb") as file:
-        file.write(b"Tolerance Volumes".ljust(80))
-        file.write(np.uint32(len(rows)).tobytes())
-        file.write(rows.tobytes())
+    return rows
 
 
 def _off(path, mesh):

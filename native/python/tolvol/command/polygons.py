@@ -3,6 +3,8 @@
 
 import numpy as np
 
+_BLOCK = 1 << 13  # quads at once, whose numbers stay in the cache
+
 
 def triangulated(vertices, corners, sizes):
     """Returns (m, 3), the places in `corners` of the corners of triangles that cut up all polygons, and (m,), their polygons.
@@ -16,30 +18,44 @@ def triangulated(vertices, corners, sizes):
             triangles = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
             return triangles, np.arange(len(triangles), dtype=np.int32)
         sizes = np.full(len(corners) // max(sizes, 1), sizes)
-    starts = np.cumsum(sizes) - sizes
-    parts, places = [], []
+    sizes = sizes.astype(np.int32)
+    starts = np.cumsum(sizes, dtype=np.int32) - sizes
+    counts = np.maximum(sizes - 2, 0)
+    firsts = np.cumsum(counts, dtype=np.int32) - counts  # the first triangle of each polygon
+    triangles = np.empty((counts.sum(), 3), np.int32)
     threes = np.flatnonzero(sizes == 3)
-    parts.append(starts[threes][:, None] + np.arange(3))
-    places.append(threes)
+    for k in range(3):
+        triangles[firsts[threes], k] = starts[threes] + k
     fours = np.flatnonzero(sizes == 4)
-    parts.append(_quads(vertices, corners, starts[fours]).reshape(-1, 3))
-    places.append(np.repeat(fours, 2))
+    for place, quad_corners in enumerate(_quads(vertices, corners, starts[fours])):
+        for k in range(3):
+            triangles[firsts[fours] + place, k] = quad_corners[k]
     for polygon in np.flatnonzero(sizes > 4).tolist():
         at = starts[polygon] + np.arange(sizes[polygon])
-        parts.append(at[_polygon(vertices[corners[at]].astype(np.float64))])
-        places.append(np.full(len(parts[-1]), polygon))
-    # The triangles stand in the order of the polygons.
-    of = np.concatenate(places).astype(np.int32)
-    order = np.argsort(of, kind="stable")
-    return np.concatenate(parts)[order].astype(np.int32), of[order]
+        cut = at[_polygon(vertices[corners[at]].astype(np.float64))]
+        triangles[firsts[polygon] : firsts[polygon] + len(cut)] = cut
+    return triangles, np.repeat(np.arange(len(sizes), dtype=np.int32), counts)
 
 
 def _quads(vertices, corners, starts):
-    """Returns (quads, 2, 3)."""
-    a, b, c, d = (vertices[corners[starts + k]].astype(np.float64) for k in range(4))
-    dent = (np.cross(b - a, c - a) * np.cross(c - a, d - a)).sum(1) < 0
-    first, second = np.array([[0, 1, 2], [0, 2, 3]]), np.array([[0, 1, 3], [1, 2, 3]])
-    return starts[:, None, None] + np.where(dent[:, None, None], second, first)
+    """Returns (2, 3, quads): the places of the corners of both triangles of each quad."""
+    blocks = np.split(starts, range(_BLOCK, len(starts), _BLOCK))
+    dent = np.concatenate([_have_dents(*(vertices[corners[block + k]] for k in range(4))) for block in blocks])
+    return np.stack([[starts, starts + 1, starts + 2 + dent], [starts + dent, starts + 2, starts + 3]])
+
+
+def _have_dents(*corners):
+    """Tells which quads, by their four corners, the cut from the first to the third corner does not divide."""
+    a, b, c, d = (corner.T.astype(np.float64, "C") for corner in corners)
+    across = c - a
+    (x, y, z), (u, v, w) = _cross(b - a, across), _cross(across, d - a)
+    return x * u + y * v + z * w < 0
+
+
+def _cross(one, other):
+    """Returns the cross products of vectors whose coordinates are rows."""
+    (x, y, z), (u, v, w) = one, other
+    return y * w - z * v, z * u - x * w, x * v - y * u
 
 
 def _polygon(points):
