@@ -226,8 +226,14 @@ def move_edited(mesh, indices, places):
 
 def new_mesh(name, vertices, faces):
     """Returns a new datablock that holds these coordinates, rounded to float32, and these faces, (m, k)."""
+    sizes = np.full(len(faces), faces.shape[1], np.int32)
+    return new_mesh_of_polygons(name, vertices, Polygons(faces.ravel(), sizes))
+
+
+def new_mesh_of_polygons(name, vertices, polygons):
+    """Returns a new datablock that holds these coordinates, rounded to float32, and these polygons."""
     mesh = bpy.data.meshes.new(name)
-    _add_polygons(mesh, vertices, Polygons(faces.ravel(), np.full(len(faces), faces.shape[1], np.int32)))
+    _add_polygons(mesh, vertices, polygons)
     mesh.update(calc_edges=True)
     return mesh
 

@@ -12,7 +12,7 @@ needs_python_reader = pytest.mark.skipif(
     "ply_import" in dir(bpy.ops.wm), reason="the reader of PLY files in this Blender is not slow, and is used"
 )
 POSITIONS = [("x", "f4"), ("y", "f4"), ("z", "f4")]
-NAMES = {"f4": "float", "f8": "double", "u1": "uchar", "i4": "int"}
+NAMES = {"f4": "float", "f8": "double", "u1": "uchar", "u2": "ushort", "i4": "int"}
 
 
 def scattered(corners, count=60, vertices=40):
@@ -64,7 +64,21 @@ def stored(ob):
         "numbers of corners": mesh_io.column(mesh.polygons, "loop_total", 1, np.int32).tolist(),
         "smooth": mesh_io.column(mesh.polygons, "use_smooth", 1, bool).tolist(),
         "attributes": sorted(attribute.name for attribute in mesh.attributes),
+        "UVs": {layer.name: mesh_io.column(layer.data, "uv", 2).tolist() for layer in mesh.uv_layers},
+        "colours": {layer.name: mesh_io.column(layer.data, "color", 4).tolist() for layer in mesh.vertex_colors},
     }
+
+
+def read_both_ways(path, monkeypatch):
+    """Returns what plain_files.py stores for a file, which it has to take, after a comparison with Blender's reader."""
+    reads, read = [], plain_files.read
+    with monkeypatch.context() as patch:
+        patch.setattr(plain_files, "read", lambda *given: reads.append(read(*given)) or reads[-1])
+        own = stored(file_io.read_file(path).objects[0])
+        assert reads == [True]
+        patch.setattr(plain_files, "read", lambda *_: False)
+        assert own == stored(file_io.read_file(path).objects[0])
+    return own
 
 
 @needs_python_reader
@@ -76,28 +90,67 @@ def test_the_mesh_is_that_of_blenders_reader(tmp_path, monkeypatch, form, corner
     fields, columns = [(name, kind) for name, _ in POSITIONS], points
     if corners == 3:  # Blender's reader leaves out normals.
         fields, columns = [*fields, ("nx", "f4"), ("ny", "f4"), ("nz", "f4")], np.hstack([points, points[::-1]])
-    path = write(tmp_path / "in file.ply", form, fields, columns, faces)
-    reads, read = [], plain_files.read
-    monkeypatch.setattr(plain_files, "read", lambda *given: reads.append(read(*given)) or reads[-1])
-    own = stored(file_io.read_file(path).objects[0])
-    assert reads == [True]
-    monkeypatch.setattr(plain_files, "read", lambda *_: False)
-    assert own == stored(file_io.read_file(path).objects[0])
+    read_both_ways(write(tmp_path / "in file.ply", form, fields, columns, faces), monkeypatch)
+
+
+COLOURS = [("red", "u1"), ("green", "u1"), ("blue", "u1")]
+
+
+@needs_python_reader
+@pytest.mark.parametrize("form", ["binary_little_endian", "binary_big_endian"])
+@pytest.mark.parametrize(
+    "fields",
+    [
+        [("s", "f4"), ("t", "f4")],
+        COLOURS,
+        [*COLOURS, ("alpha", "u1"), ("quality", "f4")],
+        [("t", "f8"), ("s", "f4"), *((name, "f4") for name, _ in COLOURS)],
+        [(name, "u2") for name, _ in COLOURS],
+    ],
+    ids=["UVs", "colours", "alpha", "both", "ushort"],
+)
+def test_uvs_and_colours_are_those_of_blenders_reader(tmp_path, monkeypatch, form, fields):
+    points, faces = scattered(4)
+    faces[20:30, 2], faces[30:40, 3] = 0, 0  # That reader turns such faces.
+    mixed = [face[: 3 + i % 2] if i % 7 else [*face, 39] for i, face in enumerate(faces.tolist())]
+    random = np.random.default_rng(1)
+    columns = [
+        random.random(len(points)) if kind[0] == "f" else random.integers(0, 256, len(points)) for _, kind in fields
+    ]
+    path = write(tmp_path / "a.ply", form, POSITIONS + fields, np.column_stack([points, *columns]), mixed)
+    own = read_both_ways(path, monkeypatch)
+    names = {name for name, _ in fields}
+    assert bool(own["UVs"]) == ("s" in names) and bool(own["colours"]) == ("red" in names)
+    values = [value for layer in (*own["UVs"].values(), *own["colours"].values()) for value in layer]
+    assert len({tuple(value) for value in values}) > 20 and set(own["numbers of corners"]) == {3, 4, 5}
+
+
+@needs_python_reader
+@pytest.mark.parametrize("kind", ["f4", "f8"])
+def test_what_is_not_finite_is_stored_as_blenders_reader_stores_it(tmp_path, monkeypatch, kind):
+    points, faces = scattered(3)
+    values = np.linspace(0, 1, 5 * len(points)).reshape(-1, 5)
+    values[::5], values[1::5], values[2::5] = np.nan, np.inf, -np.inf
+    if kind == "f8":
+        values[3::5, 0] = 1e300
+    fields = [("s", kind), ("t", kind), *((name, "f4") for name, _ in COLOURS)]
+    path = write(
+        tmp_path / "a.ply", "binary_little_endian", POSITIONS + fields, np.column_stack([points, values]), faces
+    )
+    own = read_both_ways(path, monkeypatch)
+    assert 0 in np.ravel(own["UVs"]["UVMap"]) and np.isclose(np.max(own["UVs"]["UVMap"]), np.finfo(np.float32).max)
 
 
 @needs_python_reader
 def test_what_only_blenders_reader_knows_is_left_to_it(tmp_path, monkeypatch):
     points, faces = scattered(3)
-    ragged = [*faces[:5].tolist(), [0, 1, 2, 3]]
     colours = np.hstack([points, np.full((len(points), 3), 51)])
-    channels = [("red", "u1"), ("green", "u1"), ("blue", "u1")]
-    form = "binary_little_endian"
-    files = [
-        write(tmp_path / "colours.ply", form, POSITIONS + channels, colours, faces),
-        write(tmp_path / "ragged.ply", form, POSITIONS, points, ragged),
-    ]
+    edge = b"element edge 1\nproperty int vertex1\nproperty int vertex2\nend_header\n"
+    coloured = write(tmp_path / "colours.ply", "ascii", POSITIONS + COLOURS, colours, faces)
+    edged = write(tmp_path / "edges.ply", "binary_little_endian", POSITIONS, points, faces)
+    edged.write_bytes(edged.read_bytes().replace(b"end_header\n", edge) + np.array([3, 5], "<i4").tobytes())
     read = plain_files.read
     monkeypatch.setattr(plain_files, "read", lambda *given: pytest.fail("taken") if read(*given) else False)
-    coloured, mixed = (file_io.read_file(path).objects[0].data for path in files)
-    assert coloured.color_attributes[0].data[0].color_srgb[0] == pytest.approx(51 / 255, abs=1e-3)
-    assert max(polygon.loop_total for polygon in mixed.polygons) == 4
+    one, other = (file_io.read_file(path).objects[0].data for path in (coloured, edged))
+    assert one.color_attributes[0].data[0].color_srgb[0] == pytest.approx(51 / 255, abs=1e-3)
+    assert [3, 5] in np.sort(mesh_io.column(other.edges, "vertices", 2, np.int32), 1).tolist()
