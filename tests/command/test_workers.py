@@ -10,6 +10,7 @@ import time
 
 import psutil
 import pytest
+import tolvol
 from dask.utils import key_split
 from distributed import Client
 from tolvol.tiles import plan
@@ -167,21 +168,28 @@ def test_the_dashboard_shows_rounds_and_cells(torus, tmp_path):
     assert len(groups["round 1"]) >= 6
 
 
-def test_a_run_waits_for_its_first_worker_and_says_so(torus, tmp_path, whole):
+@pytest.mark.parametrize("version", [tolvol.__version__, "9.9"])
+def test_a_run_waits_for_its_first_worker_and_asks_for_its_version(torus, tmp_path, whole, version):
     out = tmp_path / "out.ply"
+    (tmp_path / "sitecustomize.py").write_text(f"import tolvol\ntolvol.__version__ = {version!r}\n")
+    path = f"{tmp_path}{os.pathsep}{ENVIRONMENT['PYTHONPATH']}"
     with cluster(tmp_path, workers=0) as (address, _):
         process = started(torus, out, "--scheduler", address)
         lines = []
         while not any("there are no workers yet" in line for line in lines):
             lines.append(process.stdout.readline())
             assert lines[-1], process.communicate()
-        worker = subprocess.Popen([sys.executable, "-m", "distributed.cli.dask_worker", address], env=ENVIRONMENT)
+        worker = subprocess.Popen(
+            [sys.executable, "-m", "distributed.cli.dask_worker", address], env={**ENVIRONMENT, "PYTHONPATH": path}
+        )
         try:
             text, error = process.communicate(timeout=120)
         finally:
             end(worker)
-        assert process.returncode == 0, (text, error)
-    assert out.read_bytes() == whole
+    if version == tolvol.__version__:
+        assert process.returncode == 0 and out.read_bytes() == whole, (text, error)
+    else:
+        refused((process.returncode, text, error), "has '9.9' in place of tolvol", tolvol.__version__)
 
 
 def test_wrong_schedulers_are_refused(torus, tmp_path):
