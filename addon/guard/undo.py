@@ -10,6 +10,7 @@ where the mouse rests.
 import bpy
 
 from .. import status_bar
+from ..job import refusals
 from . import edit
 
 # The user sees the edit vanish, and has to have time to read why.
@@ -33,9 +34,10 @@ class TOLVOL_OT_guard_undo(bpy.types.Operator):
     def invoke(self, context, _event):
         ob, operators = edit.outside(), context.window_manager.operators
         label = operators[-1].name if operators else "The last step"
-        said = f"{label} was undone: {ob.name} would {edit.watches.shown(ob).would}"
+        name, why = ob.name, f"{ob.name} would {edit.watches.shown(ob).would}"
         edit.undo()  # After it there may be another watch, and another object in Blender's memory.
-        status_bar.say(said, _SECONDS)
+        status_bar.say(f"{label} was undone: {why}", _SECONDS)
+        refusals.keep([name], label, why)
         return {"FINISHED", "PASS_THROUGH"}
 
 

@@ -112,6 +112,12 @@ class Faces:
         found = solidity.crossing_pairs(MeshArrays(positions, triangles, None, None), threads, progress, _MOST_PAIRS)
         return len(solidity.polygon_pairs(found, polygons[of_face]))
 
+    def any_flat(self, positions):
+        """Whether a polygon has no area, as those have that an extrusion makes until what was extruded is moved."""
+        corners = positions[self.shown]
+        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        return bool((np.bincount(self.shown_polygons, areas) == 0).any())
+
     def outside(self, built, positions, options):
         """Returns how many polygons are outside in the triangulation that Blender shows. options: of a check."""
         verdict = built.check(positions, self.shown, **options).verdicts
@@ -206,6 +212,10 @@ class Watch(Preparing):
             built = volumes.native_volume(reference, tolerance, threads, progress)
             options = {"to_world": matrix, "threads": threads, "progress": progress}
             keep = {"two_sided": two_sided, "outside": "keep", "crossings": crossings}
+            if edits_faces and faces.any_flat(positions):
+                keep["max_normal_angle"] = (
+                    180.0  # The walls of an extrusion stand upright on the reference, or lean over.
+                )
             rows, polygons = faces.guarded
             guard = native.module.Guard(positions, rows, built, **keep, **options)
             # A concave or bent quad may be inside in its present triangulation and outside in the other one. The guard keeps the

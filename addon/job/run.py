@@ -146,7 +146,9 @@ class Run:
         try:
             ended = self._ended_by(context, event)
         except BaseException:
-            self._leave(context)  # Blender sends no more events after an error.
+            # Blender sends no more events after an error.
+            self._end()
+            self._leave(context)
             raise
         if ended & {"FINISHED", "CANCELLED"}:
             self._leave(context)

@@ -73,6 +73,11 @@ def targets(context):
     return [active, *(ob for ob in context.selected_objects if ob.type == "MESH" and ob not in others)]
 
 
+def blocked_others(context):
+    """Returns [(name, why it cannot be decimated)] of those selected meshes that are not active, for the panel and poll()."""
+    return [(ob.name, reason) for ob in targets(context)[1:] if (reason := decimate_blocked(ob))]
+
+
 def _choose_placement(operator, _context):
     operator.own_placements = False
 
@@ -97,7 +102,8 @@ object. An object without a reference gets one first, as by Set Reference"""
 
     @classmethod
     def poll(cls, context):
-        return allowed(cls, decimate_blocked(context.active_object))
+        others = (f"{name}: {reason}" for name, reason in blocked_others(context))
+        return allowed(cls, decimate_blocked(context.active_object) or next(others, None))
 
     def draw(self, context):
         layout = self.layout

@@ -78,7 +78,7 @@ class _Shown:
         self.ob = ob
         self._was_hidden, self._was_selected = ob.hide_get(), ob.select_get()
         self.twin = twin_of(ob, originals.kept(ob))
-        self.twin.name = f".{ob.name} original"
+        self.twin.name = f".{ob.name} original, shown"
         _link(context, ob, self.twin)
         ob.hide_set(True)
         for handlers in _handlers():

@@ -196,11 +196,14 @@ def legend_of_one(context, shown):
     if not all(drawn[other].what.present for other in together):
         below, counted = "Colours of before the last change", None
     word = verdict.together(verdict.word(other) for other in together)
-    legend.draw(context, heading, below, word, judged(together), scale, counted, drawn[ob].palette)
+    legend.draw(context, heading, below, word, judged(context, together), scale, counted, drawn[ob].palette)
 
 
-def judged(objects):
-    """Returns what the verdict of these objects is of, as text, or "" if it is of what is coloured."""
+def judged(context, objects):
+    """Returns what the verdict of these objects is of, as text, or "" if it is of what is coloured and the panel has it, too."""
+    active = context.active_object
+    if active is not None and active.type == "MESH" and active not in objects:
+        return "of another object" if len(objects) == 1 else "of other objects"
     names = [name for ob in objects if ob.mode != "SCULPT" for name in measurements.on_top(ob)]
     return f"without {' and '.join(dict.fromkeys(names))}" if names else ""
 

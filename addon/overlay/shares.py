@@ -2,6 +2,7 @@
 """Counts for the legend which share of a coloured surface lies in each band of distances, in a thread."""
 
 import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from ..redraw import redraw_views
 from .scale import rounded_up
 
 _EVERY = 0.25  # seconds between two counts while a mesh goes on changing
+_SAMPLES = 50_000  # points at which the largest distance is looked for, or more
 
 _SHARES, _LARGEST = TASKS = "shares", "largest distance"  # kinds of tasks in the queue
 
@@ -88,10 +90,22 @@ def _count(scale, tree, vertices, triangles, to_world, progress):
     return Shares(bands, outside, scale.histogram(counted), float(area))
 
 
+def _samples(vertices, triangles):
+    """Returns the vertices, and points of all triangles: their centres, or for few triangles a finer grid on each."""
+    steps = int(math.sqrt(2 * _SAMPLES / len(triangles)))
+    weights = np.full((1, 3), 1 / 3)
+    if steps > 2:
+        first, second = (each.ravel() for each in np.indices((steps + 1, steps + 1)) / steps)
+        inside = first + second <= 1 + 1e-9
+        weights = np.stack([first, second, 1 - first - second], 1)[inside]
+    points = np.einsum("wk,tkd->twd", weights, vertices[triangles].astype(np.float64))
+    return np.concatenate([vertices[np.unique(triangles)], points.reshape(-1, 3)])
+
+
 def _measure(tree, vertices, triangles, to_world, progress):
-    """Returns the largest distance at a vertex, rounded up. Distances between the vertices may be larger by little."""
-    used = vertices[np.unique(triangles)]
-    largest = np.abs(tree.signed_distance(used, to_world=to_world, progress=progress)).max()
+    """Returns the largest distance at a sample, rounded up. Between the samples it may be larger by little."""
+    samples = _samples(vertices, triangles)
+    largest = np.abs(tree.signed_distance(samples, to_world=to_world, progress=progress)).max()
     return rounded_up(float(largest)) if largest > tree.ROUNDING / tree.scale else None
 
 

@@ -12,12 +12,15 @@ import bpy
 from ..estimate import memory
 from ..job import refusals
 from ..operators import blocked
+from ..operators.decimate import blocked_others
 from ..overlay import reasons
 from ..proof import kept_warnings, last_run, verdict
 from ..reference import measurements, snapshots
 from ..shared.decimation import ISLANDS
 from ..wrapping import text_lines
 from .layout import AMBER, RED, SubPanel, active, keep_height
+
+_MOST_OTHERS = 3
 
 
 class TOLVOL_PT_notes(SubPanel, bpy.types.Panel):
@@ -37,6 +40,9 @@ def notes(context, ob):
     lines = []
     if reason := in_the_way(ob):
         lines.append((reason, "ERROR"))
+    # The button Decimate is greyed, because it would decimate all selected meshes.
+    others = blocked_others(context) if ob.mode == "OBJECT" else []
+    lines += [(f"{name}: {reason}", "ERROR") for name, reason in others[:_MOST_OTHERS]]
     if needs := memory.told(ob):
         sentence, is_too_much = needs
         lines.append((sentence, "ERROR" if is_too_much else "INFO"))

@@ -5,7 +5,7 @@ from bpy.app.handlers import persistent
 
 from .. import handlers
 from ..shared import volumes
-from . import measurements, snapshots
+from . import instances, measurements, snapshots
 
 
 @persistent
@@ -39,8 +39,10 @@ _HANDLERS = (
 
 def register():
     handlers.add(_HANDLERS)
+    instances.register()
 
 
 def unregister():
+    instances.unregister()
     handlers.remove(_HANDLERS)
     forget_all()

@@ -237,13 +237,16 @@ def test_large_percentages_have_all_their_digits():
 
 def test_legend_says_what_no_proof_covers():
     ob = torus()
-    assert draw.note(ob) == "Colours not proved" and draw.judged([ob]) == ""
+    assert draw.note(ob) == "Colours not proved" and draw.judged(bpy.context, [ob]) == ""
     ob.modifiers.new("wave", "WAVE")
     ob.shape_key_add()
     assert draw.note(ob) == "Colours with its modifiers and shape keys, not proved"
-    assert draw.judged([ob]) == "without modifiers and shape keys"
+    assert draw.judged(bpy.context, [ob]) == "without modifiers and shape keys"
     bpy.ops.object.mode_set(mode="SCULPT")
-    assert draw.note(ob) == "Colours without its modifiers, not proved" and draw.judged([ob]) == ""
+    assert draw.note(ob) == "Colours without its modifiers, not proved" and draw.judged(bpy.context, [ob]) == ""
+    bpy.ops.object.mode_set(mode="OBJECT")
+    sheet()  # It is the active object now, whose verdict the panel shows.
+    assert draw.judged(bpy.context, [ob]) == "of another object"
 
 
 def test_drawing_that_was_refused_is_asked_for_again_once_it_is_turned_on_anew(chosen_preferences):

@@ -11,6 +11,7 @@ from mathutils import Matrix
 
 from addon import native
 from addon.mesh import mesh_io
+from addon.panels import notes
 from addon.proof import verdict
 from addon.reference import snapshots, tolerances
 from addon.shared import volumes
@@ -228,13 +229,25 @@ def test_hits_the_same_result_for_any_number_of_threads():
         assert np.array_equal(results[0][0], other[0]) and np.array_equal(results[0][1], other[1])
 
 
+def test_the_button_is_greyed_while_one_of_the_selected_meshes_cannot_be_decimated():
+    ob, other = torus(), sheet()
+    other.modifiers.new("levels", "MULTIRES")
+    activate(ob)
+    assert bpy.ops.tolvol.decimate.poll()
+    other.select_set(True)
+    assert not bpy.ops.tolvol.decimate.poll()
+    with pytest.raises(RuntimeError, match="sheet: Apply the Multiresolution modifier first"):
+        bpy.ops.tolvol.decimate()
+    assert ("sheet: Apply the Multiresolution modifier first", "ERROR") in notes.notes(bpy.context, ob)[0]
+
+
 def test_more_than_float32_can_hold_is_refused():
     ob = torus()
     for vertex in ob.data.vertices:
         vertex.co.x += 1e6
     ob.data.update()
     before = world_triangles(ob)
-    with pytest.raises(RuntimeError, match="rounds positions"):
+    with pytest.raises(RuntimeError, match="which are rounded: take at least"):
         bpy.ops.tolvol.decimate(tolerance_length=0.01)
     assert np.array_equal(world_triangles(ob)[0], before[0])
 

@@ -72,6 +72,28 @@ def test_new_faces_that_are_inside_are_guarded_on():
     assert 0.95 < lower and upper <= 1
 
 
+@pytest.mark.parametrize("height", (0.3, 3.0))
+def test_extruded_faces_rise_as_far_as_the_tolerance_permits(height):
+    ob = sheet(count=10, bumps=0.0)
+    reference = guarded(ob, "editing", mode="EDIT")
+    bpy.ops.mesh.select_all(action="DESELECT")
+    edited = bmesh.from_edit_mesh(ob.data)
+    for face in edited.faces:
+        face.select_set(max(map(abs, face.calc_center_median()[:2])) < 0.2)
+    bpy.ops.mesh.extrude_region()
+    bpy.context.view_layer.update()
+    edited = bmesh.from_edit_mesh(ob.data)
+    rising = [vertex.index for vertex in edited.verts if vertex.select]
+    for vertex in edited.verts:
+        vertex.co.z += height * TOLERANCE * vertex.select
+    bmesh.update_edit_mesh(ob.data)
+    bpy.context.view_layer.update()
+    ob.update_from_editmode()
+    at = coordinates(ob)[rising, 2] / TOLERANCE
+    assert len(rising) == 9 and at.min() > 0.95 * min(height, 1) and at.max() < 1.001 * min(height, 1)
+    assert judged(ob, reference)[1] <= 1 and state(ob)["editing"][1]
+
+
 def remove_faces(ob, chosen, kind="FACE"):
     """Deletes or dissolves the faces for whose middle chosen() is true, as a user does in Edit Mode."""
     edited = bmesh.from_edit_mesh(ob.data)

@@ -293,7 +293,8 @@ def test_all_events_but_esc_are_passed_on(waiting):
 
 @pytest.mark.parametrize("kind", ("ESC", "TIMER", "MOUSEMOVE"))
 def test_an_error_while_an_event_is_handled_ends_the_run(waiting, monkeypatch, kind):
-    operator, _ = waiting
+    operator, go = waiting
+    go.set()  # Its end is waited for.
 
     def fail(*_):
         raise RuntimeError("unexpected")
@@ -303,6 +304,7 @@ def test_an_error_while_an_event_is_handled_ends_the_run(waiting, monkeypatch, k
     with pytest.raises(RuntimeError, match="unexpected"):
         operator.modal(context, event(kind))
     assert not interruptions.runs and len(context.removed) == 1
+    assert operator.progress.cancelled and operator._run._steps.gi_frame is None
 
 
 def test_an_outcome_waits_until_the_mode_is_that_of_the_start(waiting, monkeypatch):

@@ -10,7 +10,7 @@ from addon import native
 from addon.mesh import mesh_io
 from addon.operators import blocked, reference
 from addon.proof import verdict
-from addon.reference import measurements, snapshots
+from addon.reference import instances, measurements, snapshots
 from addon.reference.built import volume_of
 from scenes import activate, link, stored, torus
 
@@ -27,6 +27,23 @@ def assert_whole(ob):
     assert snapshots.stale_reason(ob) is None and verdict.of(ob).forward_within
     assert len(ob.tolvol.snapshot.vertices) == 48 * 24 and ob.tolvol.tolerance_percent == 1
     assert bpy.ops.tolvol.check() == {"FINISHED"} and bpy.ops.tolvol.decimate.poll()
+
+
+def test_the_objects_that_append_makes_of_references_are_removed(tmp_path):
+    ob, path = referenced(), str(tmp_path / "torus.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.wm.append(filepath=f"{path}/Object/torus", directory=f"{path}/Object/", filename="torus")
+    made = [ob.name for ob in bpy.data.objects if ob.name != "torus"]
+    assert len(made) == 2 and {ob.name for ob in instances.made_by_append()} == set(made)
+    instances.remove()
+    assert [ob.name for ob in bpy.data.objects] == ["torus"]
+    ob = bpy.data.objects["torus"]
+    activate(ob)
+    assert_whole(ob)
+    # An object that the user has made of a mesh stays.
+    link(bpy.data.objects.new("mine", ob.tolvol.original))
+    assert instances.made_by_append() == []
 
 
 def test_set_reference_takes_a_snapshot_that_edits_do_not_change():

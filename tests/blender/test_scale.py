@@ -12,6 +12,7 @@ from addon.background import queue
 from addon.mesh import mesh_io
 from addon.overlay import coloured, draw, field, legend, shaders, shares, surface
 from addon.overlay.scale import Scale, rounded_up
+from addon.proof import verdict
 from addon.reference import tolerances
 from coloured_scenes import scale, with_reference
 from scenes import sheet, torus, world_triangles
@@ -101,6 +102,22 @@ def test_the_range_is_the_tolerance_a_fixed_length_or_the_largest_distance(monke
     shares.forget()
     bpy.ops.tolvol.set_reference(replace=True)
     assert present().reach == tolerances.tolerance_length(settings, settings.snapshot_size)  # Nothing deviates.
+    shares.forget()
+
+
+def test_the_range_ends_at_the_largest_distance_although_all_vertices_lie_on_the_reference(monkeypatch):
+    monkeypatch.setattr(queue, "later", lambda _about, _seconds, prepare, finish: finish(prepare()(None), None))
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=6)
+    ob = with_reference(bpy.context.object)
+    assert bpy.ops.tolvol.decimate(placement="SUBSET") == {"FINISHED"}
+    ob.tolvol.deviation_range, ob.tolvol.tolerance_percent = "AUTOMATIC", 2
+    shown = surface.Surface()
+    shown.update(ob, bpy.context.evaluated_depsgraph_get())
+    for _ in range(3):
+        what, _ = coloured.of(ob, shown)
+        drawn = what and draw.with_scales(bpy.context, {ob: what})
+    largest = verdict.of(ob).forward
+    assert 0.98 * largest.lower <= drawn[ob].scale.reach <= 1.3 * largest.upper
     shares.forget()
 
 

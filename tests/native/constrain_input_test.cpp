@@ -144,7 +144,7 @@ TEST(Constrain, CoarselyStoredCoordinatesAreNamed) {
   scene.percent = 10;
   EXPECT_EQ(run(scene, scene.mesh.vertices).warnings.size(), 1u);
   scene.percent = 0.2;
-  expect_refused([&] { run(scene, scene.mesh.vertices); }, "rounds positions");
+  expect_refused([&] { run(scene, scene.mesh.vertices); }, "which are rounded: take at least");
 }
 
 TEST(Constrain, CanBeCancelled) {

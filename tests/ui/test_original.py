@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The original is shown while a key or a button is held, and comes back after a question."""
 
+import tempfile
+
 import bpy
 import numpy as np
 
@@ -134,3 +136,17 @@ def test_the_original_is_shown_while_its_button_is_held_and_asks_before_it_comes
     key("ctrl+z")
     yield from finished(lambda: torus().tolvol.snapshot is None)
     assert len(torus().data.polygons) == 48 * 24
+
+
+def test_append_leaves_no_objects_of_references():
+    yield from decimated()
+    with tempfile.TemporaryDirectory() as folder:
+        path = f"{folder}/torus.blend"
+        with window_context():
+            bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+            bpy.data.objects.remove(torus())
+            bpy.ops.wm.append(filepath=f"{path}/Object/torus", directory=f"{path}/Object/", filename="torus")
+            assert len(bpy.data.objects) > 2
+        yield from finished(lambda: len([ob for ob in bpy.data.objects if ob.type == "MESH"]) == 1)
+    yield
+    assert torus().tolvol.snapshot and torus().tolvol.original
