@@ -39,7 +39,7 @@ def _mesh(name, content):
     columns = content.columns
     colours = [*_COLOURS, *([_ALPHA] if _ALPHA in columns else [])]
     has_uvs, has_colours = (columns.keys() >= set(names) for names in (_UVS, colours))
-    # Of a text nobody knows any more whether its colours were whole numbers: they are all read as float64.
+    # A text may give whole numbers as fractions, and then they are read as float64.
     if has_colours and any(columns[channel].dtype.itemsize == 8 for channel in colours):
         return None
     corners = content.corners

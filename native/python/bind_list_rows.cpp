@@ -18,12 +18,15 @@ using Types = std::vector<std::pair<std::optional<std::string>, std::string>>;
 
 /// Takes the name of a number type, as NumPy writes it.
 py::dtype to_number_type(const std::string& name) {
-  const py::dtype type(name);
-  const bool is_floating = type.kind() == 'f' && (type.itemsize() == 4 || type.itemsize() == 8);
-  if (!is_floating && !((type.kind() == 'i' || type.kind() == 'u') && type.itemsize() <= 4)) {
-    throw InvalidInput("types must name integers of 1, 2 or 4 bytes or floats of 4 or 8 bytes, and one is " + name);
+  const InvalidInput wrong("types must name integers of 1, 2 or 4 bytes or floats of 4 or 8 bytes, and one is " + name);
+  try {
+    const py::dtype type(name);
+    const bool is_floating = type.kind() == 'f' && (type.itemsize() == 4 || type.itemsize() == 8);
+    if (!is_floating && !((type.kind() == 'i' || type.kind() == 'u') && type.itemsize() <= 4)) throw wrong;
+    return type;
+  } catch (const py::error_already_set&) {  // NumPy knows no such type.
+    throw wrong;
   }
-  return type;
 }
 
 StoredNumber to_stored_number(const std::string& name) {

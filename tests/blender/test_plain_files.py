@@ -97,7 +97,7 @@ COLOURS = [("red", "u1"), ("green", "u1"), ("blue", "u1")]
 
 
 @needs_python_reader
-@pytest.mark.parametrize("form", ["binary_little_endian", "binary_big_endian"])
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian", "binary_big_endian"])
 @pytest.mark.parametrize(
     "fields",
     [
@@ -144,13 +144,15 @@ def test_what_is_not_finite_is_stored_as_blenders_reader_stores_it(tmp_path, mon
 @needs_python_reader
 def test_what_only_blenders_reader_knows_is_left_to_it(tmp_path, monkeypatch):
     points, faces = scattered(3)
-    colours = np.hstack([points, np.full((len(points), 3), 51)])
+    colours = np.hstack([points, np.full((len(points), 3), 0.2)])
     edge = b"element edge 1\nproperty int vertex1\nproperty int vertex2\nend_header\n"
-    coloured = write(tmp_path / "colours.ply", "ascii", POSITIONS + COLOURS, colours, faces)
+    coloured = write(
+        tmp_path / "colours.ply", "ascii", POSITIONS + [(name, "f8") for name, _ in COLOURS], colours, faces
+    )
     edged = write(tmp_path / "edges.ply", "binary_little_endian", POSITIONS, points, faces)
     edged.write_bytes(edged.read_bytes().replace(b"end_header\n", edge) + np.array([3, 5], "<i4").tobytes())
     read = plain_files.read
     monkeypatch.setattr(plain_files, "read", lambda *given: pytest.fail("taken") if read(*given) else False)
     one, other = (file_io.read_file(path).objects[0].data for path in (coloured, edged))
-    assert one.color_attributes[0].data[0].color_srgb[0] == pytest.approx(51 / 255, abs=1e-3)
+    assert one.color_attributes[0].data[0].color_srgb[0] == pytest.approx(0.2, abs=1e-3)
     assert [3, 5] in np.sort(mesh_io.column(other.edges, "vertices", 2, np.int32), 1).tolist()

@@ -14,6 +14,7 @@ from tolvol.command import mesh_files, plain_formats, polygons
 from tolvol.command.mesh import Attribute, Mesh, joined, weld
 from tolvol.shared.errors import Refused
 from tolvol.shared.files import ply_file, stl_file
+from tolvol.tiles.mapped import MappedMesh
 
 import meshes
 from commands import command, read, scan, succeeded, write
@@ -137,6 +138,110 @@ def test_lists_of_any_type_among_other_numbers(order, lengths, counted, index, e
             ply_file.read(head.encode() + body[:-cut])
     with pytest.raises(Refused, match="2 bytes are left"):
         ply_file.read(head.encode() + body + b"ab")
+
+
+@pytest.mark.parametrize(
+    "types, exact",
+    [("float float float", False), ("short uchar char", False)]
+    + [(types, True) for types in ("int int int", "float double double", "uint float float", "float float int")],
+)
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian"])
+def test_positions_are_held_exactly_whatever_types_they_have(tmp_path, types, exact, form):
+    types = types.split()
+    large = 2**24 + 1  # float32 cannot hold it.
+    rows = np.zeros(3, [(axis, ply_file._PLY_TYPES[kind]) for axis, kind in zip("xyz", types)])
+    for i, (axis, kind) in enumerate(zip("xyz", types)):
+        rows[axis][i] = large if kind in ("int", "uint", "double") else 3
+    head = f"ply\nformat {form} 1.0\nelement vertex 3\n"
+    head += "".join(f"property {kind} {axis}\n" for axis, kind in zip("xyz", types))
+    head += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    if form == "ascii":
+        body = "".join(" ".join(f"{value}" for value in row) + "\n" for row in rows.tolist()).encode() + b"3 0 1 2\n"
+    else:
+        body = rows.tobytes() + b"\3" + np.arange(3, dtype="<i4").tobytes()
+    (tmp_path / "a.ply").write_bytes(head.encode() + body)
+    vertices = read(tmp_path / "a.ply").vertices
+    assert vertices.dtype == (np.float64 if exact else np.float32)
+    assert vertices.tolist() == [list(row) for row in rows.tolist()]
+    if form != "ascii":
+        assert MappedMesh(tmp_path / "a.ply").corners(0, 1)[0].tolist() == vertices.tolist()
+
+
+@pytest.mark.parametrize(
+    "kind, values, found",
+    [
+        ("float", [0.25, 0.5, 1.002], np.float32),
+        ("uchar", [0, 128, 255], np.uint8),
+        ("ushort", [0, 128, 255], np.uint8),
+        ("int", [0, 128, 255], np.uint8),
+        ("double", [0, 0.5, 1], np.float32),
+        ("ushort", [300, 65535, 255], None),
+        ("int", [-1, 0, 255], None),
+    ],
+)
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian"])
+def test_colours_keep_their_values_or_are_left_out(tmp_path, form, kind, values, found):
+    names = ("red", "green", "blue")
+    types = [(axis, "<f4") for axis in "xyz"] + [(name, ply_file._PLY_TYPES[kind]) for name in names]
+    rows = np.zeros(3, types)
+    for i, axis in enumerate("xyz"):
+        rows[axis][i] = 1
+    for name, value in zip(names, values):
+        rows[name] = value
+    head = f"ply\nformat {form} 1.0\nelement vertex 3\n" + "".join(f"property float {axis}\n" for axis in "xyz")
+    head += "".join(f"property {kind} {name}\n" for name in names)
+    head += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    if form == "ascii":
+        body = "".join(" ".join(f"{value}" for value in row) + "\n" for row in rows.tolist()).encode() + b"3 0 1 2\n"
+    else:
+        body = rows.tobytes() + b"\3" + np.arange(3, dtype="<i4").tobytes()
+    (tmp_path / "a.ply").write_bytes(head.encode() + body)
+    mesh = read(tmp_path / "a.ply")
+    if found is None:
+        assert not mesh.attributes and mesh.others == ("its colours, some of which are not between 0 and 255",)
+    else:
+        colours = mesh.attributes["colours"].values
+        assert colours.dtype == found and np.allclose(colours, values, rtol=1e-6)
+
+
+def test_lists_of_vertices_are_said_to_be_left_out(tmp_path):
+    text = ply_text().replace(b"property float z\n", b"property float z\nproperty list uchar int adj\n")
+    for row in (b"1 0 0\n", b"1 1 0\n", b"1 0 1\n"):
+        text = text.replace(row, row[:-1] + b" 2 0 1\n")
+    (tmp_path / "a.ply").write_bytes(text)
+    assert read(tmp_path / "a.ply").others == ("the lists adj of its vertices",)
+
+
+@pytest.mark.parametrize("newline", [b"\n", b"\r\n", b"\r"])
+def test_a_ply_header_may_end_its_lines_in_any_way(tmp_path, newline):
+    head = ply_text().replace(b"ply\n", b"ply\ncomment \xc3\x85 property x\n").replace(b"\n", newline)
+    (tmp_path / "a.ply").write_bytes(head)
+    assert len(read(tmp_path / "a.ply").triangles) == 1
+    # The first byte of the data is 10, which would be a part of the line's end if lines did not end with 13 alone.
+    points = np.array([(1, 0, 0), (0, 1, 0), (0, 0, 1)], "<f4")
+    points[0, 0] = np.frombuffer(b"\x0a\x00\x80\x3f", "<f4")[0]
+    binary = ply_text().split(b"end_header\n")[0].replace(b"ascii", b"binary_little_endian") + b"end_header\n"
+    body = points.tobytes() + b"\3" + np.arange(3, dtype="<i4").tobytes()
+    (tmp_path / "b.ply").write_bytes(binary.replace(b"\n", newline) + body)
+    assert np.array_equal(read(tmp_path / "b.ply").vertices, points)
+
+
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        ((b"element vertex 3", b"element vertex -1"), "declares -1 elements vertex"),
+        ((b"property float z\n", b"property float z\nproperty float x\n"), "several properties of its vertex"),
+        ((b"element face 1", b"element face 0\nelement face 1"), "several of its elements are named face"),
+    ],
+)
+def test_a_header_that_contradicts_itself_is_refused(tmp_path, change, said):
+    for form in (b"ascii", b"binary_little_endian"):
+        path = tmp_path / "a.ply"
+        path.write_bytes(ply_text().replace(b"ascii", form).replace(*change))
+        with pytest.raises(Refused, match=said):
+            read(path)
+    with pytest.raises(Refused, match=said):
+        MappedMesh(path)
 
 
 @pytest.mark.parametrize("counted, code, length", [("char", "b", -1), ("uint", "I", 2**32 - 1), ("float", "f", 2.5)])
@@ -383,6 +488,10 @@ def test_each_polygon_among_others_is_cut_as_it_is_alone(monkeypatch, block):
         [(0, 0), (4, 0), (4, 3), (2, 1), (0, 3)],
         [(0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)],
         [(0, 0), (1, 0), (2, 0), (2, 2), (0, 2)],
+        [(0, 0), (4, 0), (4, 4), (2, 1), (2, 1), (0, 4)],
+        [(2, 1), (2, 1), (2, 1), (0, 4), (0, 0), (4, 0), (4, 4)],
+        [(0, 0), (4, 0), (4, 3), (2, 1), (2, 0.5), (2, 1), (0, 3)],
+        [(0, 0), (2, 0), (4, 0), (4, 4), (2, 1), (1, 2.5), (0, 4), (0, 4)],
     ],
 )
 def test_polygons_with_dents_are_covered_once(outline):
@@ -394,6 +503,15 @@ def test_polygons_with_dents_are_covered_once(outline):
         areas = area(turned, found)
         assert len(found) == len(points) - 2 and areas.sum() == pytest.approx(whole)
         assert (areas * np.sign(whole) > -1e-12).all(), "no triangle is turned over"
+
+
+def test_a_polygon_that_repeats_a_corner_is_the_same_surface(tmp_path):
+    corners = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\n"
+    (tmp_path / "one.obj").write_text(f"{corners}f 1 2 3 4 5\n")
+    (tmp_path / "other.obj").write_text(f"{corners}f 1 2 3 4 4 5\n")
+    one, other = (read(tmp_path / f"{name}.obj") for name in ("one", "other"))
+    found = tolvol.hausdorff(one.vertices, one.triangles, other.vertices, other.triangles)
+    assert max(found.forward.upper, found.backward.upper) < 1e-12
 
 
 def test_polygons_are_said_to_be_cut(tmp_path):

@@ -42,6 +42,7 @@ def test_rows_are_taken_apart(kind):
         ({"types": [(None, "i8")]}, "types.*i8"),
         ({"types": [(None, "S3")]}, "types.*S3"),
         ({"types": [("f2", "u1")]}, "types.*f2"),
+        ({"types": [(None, "nonsense")]}, "types.*nonsense"),
     ],
 )
 def test_wrong_arguments_are_refused(change, words):

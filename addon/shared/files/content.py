@@ -16,7 +16,7 @@ class Content:
     """What a mesh file holds. The arrays are None where the check does not build them, as for glTF.
 
     faces: the number of faces that the file declares
-    vertices: (n, 3) float32 or float64, as the file stores them
+    vertices: (n, 3) float32 or float64, whichever holds exactly what the file stores
     corners: the vertex at each corner of the polygons, one polygon after another; integers
     sizes: (faces,) the number of corners of each polygon, or one number if all have as many
     columns: the other numbers of each vertex, by the names in a PLY file, {name: (n,)}

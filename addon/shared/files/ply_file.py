@@ -21,6 +21,8 @@ _PLY_TYPES = {
     **dict.fromkeys(("double", "float64"), "f8"),
 }
 
+_EXACT = {"f8", "i4", "u4"}  # the types of numbers that float32 cannot hold
+
 _BLANK = b" \t\r\n\0"  # Some programs end a file with an empty line, or fill it up.
 
 
@@ -28,8 +30,7 @@ def read(data):
     """Returns the Content of a file."""
     form, elements, start = header(data)
     body = memoryview(data)[start:]
-    wide = any(name == "vertex" and ("x", None, "f8") in properties for name, _, properties in elements)
-    order = byte_order(form)
+    order, declared = byte_order(form), {name: properties for name, _, properties in elements}
     if form == "ascii":  # The text is turned into a binary body of doubles, so that one reader serves both forms.
         found = numbers(data[start:], np.float64)
         if found is None:
@@ -44,15 +45,18 @@ def read(data):
     for name, count, properties in elements:
         try:
             rows, offset = _ply_element(body, offset, count, properties, order)
-        # int() raises OverflowError if a list has an infinite length. InvalidInput is a ValueError.
-        except (ValueError, OverflowError):
-            raise Refused(f"the file ends inside its list of {name} elements") from None
+        except ValueError:  # InvalidInput is one.
+            lengths = any(counted for _, counted, _ in properties)
+            damaged = ", or the length of a list there is negative or not whole" if lengths else ""
+            raise Refused(f"the file ends inside its list of {name} elements{damaged}") from None
         if name == "vertex":
             if not all(_is_column(rows.get(axis)) for axis in "xyz"):
                 raise Refused("its vertices have no x, y, z")
-            vertices = _positions(rows, np.float64 if wide else np.float32)
+            vertices = _positions(rows, position_type(declared[name]))
             require_finite(vertices)
-            columns = {field: values for field, values in rows.items() if field not in "xyz" and _is_column(values)}
+            columns = _columns(rows, declared[name])
+            if lists := [field for field, counted, _ in properties if counted]:
+                others.append(f"the lists {', '.join(lists)} of its vertices")
         elif name == "face" and count:
             if vertices is None:
                 raise Refused("its faces stand before its vertices: save it again with another program")
@@ -75,6 +79,26 @@ def require_end(rest, more=0):
         raise Refused(
             f"{left:,} bytes are left after all that its header declares: the numbers in its header are wrong"
         )
+
+
+def position_type(properties):
+    """Returns the type that holds the positions of vertices with these properties exactly: np.float32 or np.float64."""
+    kinds = {kind for field, _, kind in properties if field in ("x", "y", "z")}
+    return np.float64 if kinds & _EXACT else np.float32
+
+
+def _columns(rows, declared):
+    """Returns the numbers of the vertices besides their positions, {property: (n,)}, in the types that the header declares."""
+    found = {}
+    for field, _, kind in declared:
+        values = rows[field]
+        if field in ("x", "y", "z") or not _is_column(values):
+            continue
+        if values.dtype.kind == "f" and kind[0] != "f":  # of a text
+            least, most = np.iinfo(kind).min, np.iinfo(kind).max
+            kind = kind if (are_whole(values) & (values >= least) & (values <= most)).all() else "f8"
+        found[field] = values.astype(kind) if values.dtype.itemsize == 8 else values
+    return found
 
 
 def _positions(rows, dtype):
@@ -120,10 +144,12 @@ def header(data):
 
     elements: [(name, count, properties)]; properties: [(name, type of a list's length or None, type)].
     """
-    end = re.search(rb"^end_header[ \t]*(\r\n|\n|\r)", data, re.MULTILINE) if data.startswith(b"ply") else None
-    if end is None:
+    first = re.match(rb"ply[ \t]*(\r\n|\n|\r)", data)
+    # Where lines end with \r alone, a \n behind the header would be data.
+    last = first and re.search(rb"[\r\n]end_header[ \t]*" + (rb"\r" if first[1] == b"\r" else rb"(\r\n|\n|\r)"), data)
+    if not last:
         raise Refused("this is not a PLY file: its header is missing or has no end")
-    lines = [line.split() for line in data[: end.start()].decode("latin-1").splitlines()]
+    lines = [line.decode("latin-1").split() for line in re.split(rb"[\r\n]+", data[: last.start()])]
     form = next((words[1] for words in lines if words[:1] == ["format"] and len(words) > 1), "not given")
     if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
         raise Refused(f"its PLY format is {form}, but only ascii and binary can be read")
@@ -138,7 +164,21 @@ def header(data):
                 elements[-1][2].append((words[2], None, _PLY_TYPES[words[1]]))
         except (IndexError, KeyError, ValueError):
             raise Refused(f"its PLY header has a line that cannot be read: {' '.join(words)}") from None
-    return form, elements, end.end()
+    _require_sound(elements)
+    return form, elements, last.end()
+
+
+def _require_sound(elements):
+    for name, count, properties in elements:
+        if count < 0:
+            raise Refused(f"its PLY header declares {count} elements {name}")
+        _require_different([field for field, _, _ in properties], f"properties of its {name} elements are")
+    _require_different([name for name, _, _ in elements], "of its elements are")
+
+
+def _require_different(names, what):
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise Refused(f"its PLY header is damaged: several {what} named {twice[0]}")
 
 
 def byte_order(form):
@@ -162,12 +202,15 @@ def _ply_element(body, offset, count, properties, order):
     The column of a list property is an array (count, length) if all lists have the same length. Otherwise it is a pair
     of arrays: the entries of one list after another, and the length of each list.
     """
-    if not 0 <= count <= len(body):
+    if count > len(body):
         raise ValueError
     lengths, start = {}, offset
     for field, counted, kind in properties:
         if counted:
-            lengths[field] = int(np.frombuffer(body, order + counted, 1, start)[0]) if count else 0
+            length = np.frombuffer(body, order + counted, 1, start)[0] if count else 0
+            if not 0 <= length <= len(body):  # Nor is it then a number.
+                raise ValueError
+            lengths[field] = int(length)
             start += np.dtype(counted).itemsize
         start += lengths.get(field, 1) * np.dtype(kind).itemsize
     dtype = row_type(properties, lengths, order)

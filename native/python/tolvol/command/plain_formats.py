@@ -47,20 +47,25 @@ def _read(extension, data):
 
 def _attributes(content, triangles, places):
     """Returns (attributes, words for what is left out)."""
-    columns, found = dict(content.columns), {}
+    columns, found, others = dict(content.columns), {}, []
     for kind, *choices in (("normals", _NORMALS), ("colours", _COLOURS, _COLOURS[:3]), ("UVs", *_UVS)):
         names = next((names for names in choices if all(name in columns for name in names)), None)
         if names:
             values = np.stack([columns.pop(name) for name in names], 1)
             values = values.astype(values.dtype.newbyteorder("="))
-            # A text is read as float64; what has no fraction are colours from 0 to 255.
-            whole = kind == "colours" and values.dtype == np.float64 and values.max(initial=0) > 1
-            dtype = np.uint8 if whole or values.dtype == np.uint8 else np.float32
-            found[kind] = Attribute(values.astype(dtype), triangles)
+            if kind == "colours" and values.dtype.kind in "iu":
+                if values.min(initial=0) < 0 or values.max(initial=0) > 255:
+                    others.append("its colours, some of which are not between 0 and 255")
+                    continue
+                found[kind] = Attribute(values.astype(np.uint8), triangles)
+            else:
+                found[kind] = Attribute(values.astype(np.float32), triangles)
     for kind, pair in (("UVs", content.uvs), ("normals", content.normals)):
         if pair is not None:
             found[kind] = Attribute(pair[0], pair[1][places].astype(np.int32), split=True)
-    return found, (f"the numbers {', '.join(columns)} of its vertices",) * bool(columns)
+    if columns:
+        others.append(f"the numbers {', '.join(columns)} of its vertices")
+    return found, others
 
 
 def write(path, mesh):

@@ -74,11 +74,23 @@ def _polygon(points):
         across = across[::-1]
     flat = np.ascontiguousarray((points - points[0]) @ across.T)
     found = mapbox_earcut.triangulate_float64(flat, np.array([count], np.uint32)).reshape(-1, 3).astype(int)
-    if (
-        len(found) != count - 2
-    ):  # Points on one line are left out there; as they are part of the surface, they are kept.
-        return fan
     corner = flat[found]
     one, two = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    turned = (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]).sum() < 0
-    return found[:, ::-1] if turned else found
+    if (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]).sum() < 0:
+        found = found[:, ::-1]
+    # Points on a line between others, and all but one of those at one position, are left out there. As they are part of
+    # the surface, they get triangles without an area.
+    found = np.concatenate([found, _flat_triangles(np.unique(found), count)])
+    return found if len(found) == count - 2 else fan
+
+
+def _flat_triangles(used, count):
+    """Returns (k, 3): a fan from each used corner over the unused ones that follow, up to the next used one.
+
+    used: indices of corners of a polygon with `count` corners, ascending.
+    """
+    flat = []
+    for corner, following in zip(used, np.roll(used, -1)):
+        ways = (following - corner) % count
+        flat += [(corner, (corner + k) % count, (corner + k + 1) % count) for k in range(1, ways)]
+    return np.array(flat, int).reshape(-1, 3)

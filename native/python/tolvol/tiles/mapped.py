@@ -91,8 +91,7 @@ class MappedMesh:
                 if not {"x", "y", "z"} <= set(row.names):
                     raise Refused("its vertices have no x, y, z")
                 self._vertices = np.memmap(self.path, row, "r", offset, (count,))
-                wide = any(row[axis].itemsize == 8 for axis in "xyz")
-                self.dtype = np.dtype(np.float64 if wide else np.float32)
+                self.dtype = np.dtype(ply_file.position_type(properties))
             elif is_face:
                 if not lists or lists[0] not in ("vertex_indices", "vertex_index"):
                     raise Refused("its faces name no vertices")

@@ -42,7 +42,7 @@ class Plan:
         cells, needed = self._fewest([self._reference])
         if not cells:
             raise Refused(
-                f"--memory: {memory // 1_000_000:,} MB is too little: the triangles within the tolerance of one place need at "
+                f"--memory: {memory / 1e6:g} MB is too little: the triangles within the tolerance of one place need at "
                 f"least {math.ceil((FIXED + self._with_grid(needed)) / 1e6):,} MB"
             )
         self.first = cells
