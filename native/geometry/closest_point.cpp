@@ -14,6 +14,14 @@
 // p - x is at most 4 M long, and a dot product errs by at most 4 u 4 M |n|. The witness of closest_point errs by 20 u M
 // and its distance by 4 u 4 M more. All this is less than e = 64 u M, and the code takes twice as much. With s the
 // square root of `squared`, (s + e)^2 <= s^2 (1 + 1e-6) + e^2 (1 + 1e6) <= s^2 (1 + 1e-6) + 2e6 e^2.
+//
+// corner_noise covers the rounding of dot products like (p - a) . (b - a). With M and u as above both factors are at
+// most 2 sqrt(3) M long, so that one product errs by less than 60 u M^2. Where the code compares a difference of two of
+// them with 0, the errors of both count. A corner that is nearest by more than 512 u M^2 therefore passes the
+// comparisons of its own region and none of another corner, a clamped edge ends in it exactly, and the edge opposite to
+// it is farther by more than rounding. The foot in the frame of a thin triangle has a negative weight then: along the
+// longest edge it is beyond an end by more than rounding if that is the corner, and else across it, because both edges
+// at the corner lean back.
 #include "geometry/closest_point.h"
 
 #include <algorithm>
@@ -95,13 +103,14 @@ ClosestPoint nearest_in_range(const glm::dvec3& p, const glm::dvec3& a, const gl
   if (d1 <= 0 && d2 <= 0) return at(p, a, {1, 0, 0});
   const double d3 = glm::dot(ab, bp), d4 = glm::dot(ac, bp);
   if (d3 >= 0 && d4 <= d3) return at(p, b, {0, 1, 0});
+  // All corners come before the edges, because the signs of the products below are less sure.
+  const double d5 = glm::dot(ab, cp), d6 = glm::dot(ac, cp);
+  if (d6 >= 0 && d5 <= d6) return at(p, c, {0, 0, 1});
   const double vc = d1 * d4 - d3 * d2;
   if (vc <= 0 && d1 >= 0 && d3 <= 0) {
     const double t = std::min(d1 / ab2, 1.0);
     return at(p, on_segment(a, b, t), {1 - t, t, 0});
   }
-  const double d5 = glm::dot(ab, cp), d6 = glm::dot(ac, cp);
-  if (d6 >= 0 && d5 <= d6) return at(p, c, {0, 0, 1});
   const double vb = d5 * d2 - d1 * d6;
   if (vb <= 0 && d2 >= 0 && d6 <= 0) {
     const double t = std::min(d2 / ac2, 1.0);
@@ -125,6 +134,8 @@ ClosestPoint nearest_in_range(const glm::dvec3& p, const glm::dvec3& a, const gl
 }
 
 }  // namespace
+
+double corner_noise(double size) { return 512 * kUnitRoundoff * size * size; }
 
 ClosestPoint closest_point(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
   const double length = std::max({largest(p - a), largest(b - a), largest(c - a)});

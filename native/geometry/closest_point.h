@@ -25,4 +25,8 @@ ClosestPoint closest_point(const glm::dvec3& p, const glm::dvec3& a, const glm::
 /// rounding of the coordinates. O(1).
 bool is_beyond(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double squared);
 
+/// Where the dot products of p - a with b - a and with c - a are both below minus this, closest_point(p, a, b, c) is
+/// exactly a, and so it is for any order of the corners. No coordinate may be larger than `size`.
+double corner_noise(double size);
+
 }  // namespace tolvol

@@ -53,6 +53,15 @@ bool Hierarchy::is_nearest_slice(const glm::dvec3& q, std::uint32_t place) const
   return at >= slice.from * legs.longer() && at < slice.to * legs.longer();
 }
 
+const Hierarchy::AroundHub* Hierarchy::nearest_at_hub(std::uint32_t node, const glm::dvec3& q) const {
+  if (around_.empty() || around_[node] == kNone) return nullptr;
+  const AroundHub& around = hubs_[around_[node]];
+  const glm::dvec3 way = q - around.hub;
+  double most = 0;  // the largest dot product of `way` with what leads to another corner
+  for (int k = 0; k < 3; ++k) most += std::max(way[k] * double(around.lower[k]), way[k] * double(around.upper[k]));
+  return most < -corner_noise(std::max(largest(q), largest(centre_) + 1)) ? &around : nullptr;
+}
+
 glm::dvec3 Hierarchy::local(const glm::dvec3& p, bool& beyond_reach) const {
   const glm::dvec3 at = scaled(p) - centre_;
   const double farthest = largest(at);

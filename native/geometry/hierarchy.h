@@ -56,7 +56,7 @@ class Hierarchy {
   };
 
   /// Copies the triangles of a valid mesh (geometry/triangle_mesh.h), with about 150 bytes for each, or 330 if nearly
-  /// all are needles, and up to six times as much for those around a corner that very many share. O(m), 30 ms for
+  /// all are needles, and up to seven times as much for those around a corner that very many share. O(m), 30 ms for
   /// 270,000 triangles on one thread; O(m log m) for needles. Degenerate triangles are kept as the segments or points
   /// that they are. `threads`: 0 means one for each core.
   explicit Hierarchy(const TriangleMesh& mesh, unsigned threads = 1);
@@ -116,6 +116,12 @@ class Hierarchy {
     float lower[3][kWidth], upper[3][kWidth];  // are local and rounded outwards; an empty child lies infinitely far
     std::uint32_t child[kWidth];
   };
+  /// Tells of a node below which there are only slices of triangles with one hub.
+  struct AroundHub {
+    glm::dvec3 hub;                   // is scaled
+    float lower[3], upper[3];         // hold all that leads from the hub to another corner
+    std::uint32_t first = kTriangle;  // is the place of a slice of the triangle with the lowest index
+  };
   struct Build;
   glm::dvec3 scaled(const glm::dvec3& p) const { return p * scale_; }
   /// Returns the local point from which the triangle nearest to p (in the mesh's units) is searched.
@@ -128,6 +134,9 @@ class Hierarchy {
   /// Tells whether the point of the triangle that is nearest to q, in scaled coordinates, is in the slice of this
   /// place.
   bool is_nearest_slice(const glm::dvec3& q, std::uint32_t place) const;
+  /// Returns what is known of a node if the common hub of all triangles below it is surely the point of each of them
+  /// that is nearest to q, in scaled coordinates, or null.
+  const AroundHub* nearest_at_hub(std::uint32_t node, const glm::dvec3& q) const;
   /// Returns the next triangle with exactly the same corners, or kNone after the last one.
   std::uint32_t twin(std::uint32_t triangle) const { return twin_.empty() ? kNone : twin_[triangle]; }
 
@@ -154,6 +163,8 @@ class Hierarchy {
   Unfilled<Node> nodes_;                 // nodes_[0] is the root
   std::vector<std::uint32_t> turned_;    // maps a node to its oriented boxes or kNone; it is empty if no node has any
   std::vector<OrientedBoxes> oriented_;  // replace the boxes of some nodes
+  std::vector<std::uint32_t> around_;    // maps a node to its place in hubs_ or kNone; it is empty if there are no hubs
+  std::vector<AroundHub> hubs_;          // of the nodes around hubs
   Unfilled<Corners> corners_;            // are scaled, in the sorted order, with only the first of equal triangles
   std::vector<HubSlice> slices_;         // of all triangles that are cut into slices
   Unfilled<std::uint32_t> slice_;        // maps a place in the sorted order to an index in slices_, or to kNone for a
@@ -192,8 +203,22 @@ Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, d
     closest = candidate;
     bound = enough(triangle) ? -1 : std::min(bound, closest.distance_squared);
   };
+  // Where a hub is nearest, it is the nearest point of all triangles around it. Of those below a node, only the one
+  // that would win the tie is looked at, if it is accepted.
+  const auto enter = [&](std::uint32_t node) {
+    if (!may_accept(node)) return false;
+    const AroundHub* const around = nearest_at_hub(node, q);
+    if (!around) return true;
+    const glm::dvec3 way = q - around->hub;
+    const double there = glm::dot(way, way);
+    const auto may_win = [&] {
+      return there < closest.distance_squared || (there == closest.distance_squared && triangle_[around->first] < best);
+    };
+    if (may_win()) attempt(around->first);
+    return may_win();
+  };
   if (hint < place_.size()) attempt(place_[hint]);
-  const auto nodes = nodes_.empty() ? 0 : std::uint32_t(walk<1>({at}, bound, attempt, may_accept));
+  const auto nodes = nodes_.empty() ? 0 : std::uint32_t(walk<1>({at}, bound, attempt, enter));
   Nearest found;
   if (best != kNone) found = beyond_reach ? seen_from(p, best) : unscaled(best, closest, scale_);
   if (!(found.distance <= radius)) found = Nearest{};

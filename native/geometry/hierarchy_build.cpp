@@ -320,6 +320,56 @@ struct Hierarchy::Build {
     gather_oriented(subtrees);
   }
 
+  /// Finds the nodes below which there are only slices around one hub. A node comes before those below it.
+  void find_hubs() {
+    if (tree.slices_.empty()) return;
+    tolvol::fill(tree.around_, tree.nodes_.size(), kNone);
+    for (std::uint32_t node = tree.node_count(); node-- > 0;) {
+      poll_at(node);
+      AroundHub all{};
+      bool is_around_one = true;
+      const auto add = [&](const AroundHub& part) {
+        if (all.first == kTriangle) {
+          all = part;
+          return;
+        }
+        is_around_one = is_around_one && all.hub == part.hub;
+        if (tree.triangle_[part.first] < tree.triangle_[all.first]) all.first = part.first;
+        for (int k = 0; k < 3; ++k) {
+          all.lower[k] = std::min(all.lower[k], part.lower[k]);
+          all.upper[k] = std::max(all.upper[k], part.upper[k]);
+        }
+      };
+      const Node& above = tree.nodes_[node];
+      for (int c = 0; c < kWidth && is_around_one; ++c) {
+        if (above.lower[0][c] > above.upper[0][c]) continue;  // there is no such child
+        const std::uint32_t below = above.child[c], place = below & ~kTriangle;
+        if (below & kTriangle) {
+          is_around_one = tree.slice_[place] != kNone;
+          if (is_around_one) add(around_hub(place));
+        } else {
+          is_around_one = tree.around_[below] != kNone;
+          if (is_around_one) add(tree.hubs_[tree.around_[below]]);
+        }
+      }
+      if (!is_around_one) continue;
+      tree.around_[node] = std::uint32_t(tree.hubs_.size());
+      tree.hubs_.push_back(all);
+    }
+  }
+
+  AroundHub around_hub(std::uint32_t place) const {
+    const Corners& t = tree.corners_[place];
+    const std::uint32_t hub = tree.slices_[tree.slice_[place]].hub;
+    const glm::dvec3 to[2] = {t[(hub + 1) % 3] - t[hub], t[(hub + 2) % 3] - t[hub]};
+    AroundHub around{t[hub], {}, {}, place};
+    for (int k = 0; k < 3; ++k) {
+      const auto lower = float(std::min(to[0][k], to[1][k])), upper = float(std::max(to[0][k], to[1][k]));
+      around.lower[k] = lower - spread(lower), around.upper[k] = upper + spread(upper);
+    }
+    return around;
+  }
+
   void gather_oriented(std::vector<Subtree>& subtrees) {
     std::size_t count = 0;
     for (const Subtree& subtree : subtrees) count += subtree.oriented.size();
@@ -372,6 +422,7 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh, unsigned threads) {
   build.place_triangles(mesh);
   build.sum_areas();
   build.make_nodes();
+  build.find_hubs();
 }
 
 }  // namespace tolvol

@@ -102,6 +102,29 @@ TEST(ClosestPoint, NoWeightIsNegativeAtAnEdge) {
   }
 }
 
+// No point that is moved by rounding seems to be nearer than a corner that is nearest.
+TEST(ClosestPoint, IsExactlyACornerThatIsSurelyNearest) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto vector = [&] { return dvec3(uniform(random), uniform(random), uniform(random)); };
+  int sure = 0;
+  for (int i = 0; i < 200000; ++i) {
+    const double length = std::pow(10, -8 * std::abs(uniform(random))),
+                 width = std::pow(10, -16 * std::abs(uniform(random)));
+    const dvec3 a = vector(), b = a + length * vector(), c = a + uniform(random) * (b - a) + length * width * vector();
+    const dvec3 p = a + std::pow(10, -8 * std::abs(uniform(random))) * vector();
+    const double noise = tolvol::corner_noise(4);
+    if (!(glm::dot(p - a, b - a) < -noise && glm::dot(p - a, c - a) < -noise)) continue;
+    ++sure;
+    for (const ClosestPoint& q : {closest_point(p, a, b, c), closest_point(p, c, a, b), closest_point(p, b, c, a),
+                                  closest_point(p, a, c, b), closest_point(p, b, a, c), closest_point(p, c, b, a)}) {
+      ASSERT_EQ(q.point, a) << i;
+      ASSERT_EQ(q.distance_squared, glm::dot(p - a, p - a));
+    }
+  }
+  EXPECT_GT(sure, 10000);
+}
+
 // Needles and slivers of every thinness, asked from their plane, from close by and from afar.
 TEST(ClosestPoint, NeedlesAtRoundingLevel) {
   std::mt19937 random(2);

@@ -193,6 +193,38 @@ TEST(Hierarchy, LooksAtFewNearTheHubOfAFan) {
   }
 }
 
+// Where the hub is the nearest point, all needles around it are as near.
+TEST(Hierarchy, LooksAtFewWhereAHubIsNearest) {
+  const unsigned count = many(20000);
+  shapes::Random random(24);
+  TriangleMesh mesh;  // a sector of a fan, whose hub has the lowest x
+  for (unsigned i = 0; i <= count; ++i) {
+    const double angle = double(i) / count - 0.5;
+    mesh.vertices.emplace_back(std::cos(angle), std::sin(angle), 0.01 * random.share());
+    if (i > 0) mesh.triangles.push_back({i, i - 1, count + 1});
+  }
+  mesh.vertices.emplace_back(0);
+  std::ranges::shuffle(mesh.triangles, std::mt19937(25));
+  const Hierarchy hierarchy(mesh);
+  std::size_t looked_at = 0;
+  for (int i = 0; i < 30; ++i) {
+    const dvec3 p = (i % 3 == 0 ? 1e-6 : 1.0) * dvec3(-1, random.share() - 0.5, random.share() - 0.5);
+    const Hierarchy::Nearest found = hierarchy.nearest_if(p, [&](std::uint32_t) { return ++looked_at > 0; });
+    looked_at += found.nodes;
+    ASSERT_EQ(found.point, dvec3(0)) << i;
+    ASSERT_EQ(found.triangle, 0u);
+    ASSERT_EQ(found.weights, brute(mesh, p, kInfinity, all).weights);
+    // One that is not accepted says nothing about the others.
+    for (const std::uint32_t step : {2u, 50u}) {
+      const auto some = [&](std::uint32_t triangle) { return triangle % step == 1; };
+      ASSERT_EQ(hierarchy.nearest_if(p, some).triangle, 1u);
+      const auto late = [&](std::uint32_t triangle) { return triangle > count / step; };
+      ASSERT_EQ(hierarchy.nearest_if(p, late).triangle, count / step + 1);
+    }
+  }
+  EXPECT_LT(looked_at, 30u * 100);
+}
+
 // One of the edges at the hub may be much shorter than the other or have no length, or both may have any direction.
 TEST(Hierarchy, LooksAtFewNearTheHubOfUnequalEdges) {
   const unsigned count = many(20000);
