@@ -9,17 +9,18 @@
 
 namespace tolvol {
 
-/// More of the tolerance than this share is not left to rounding.
-constexpr double most_rounding = 0.5;
+/// No more than this share of the tolerance is left to rounding.
+constexpr double kMostRounding = 0.5;
 
 std::optional<std::string> storage_warning(const ToleranceVolume& volume, const StoredSpace& space,
                                            std::span<const glm::dvec3> stored) {
   const double share = space.storage_step(stored) / volume.frame_tolerance();
   std::ostringstream text;
-  if (share > most_rounding) {
+  if (share > kMostRounding) {
     // The frame's tolerance leaves a little out for the mapping to the world. A tenth more makes up for that.
     text << "the tolerance is too small for coordinates of this size and type, which are rounded: take at least "
-         << std::ceil(11 * share / most_rounding) / 10 << " times this tolerance, or move the mesh nearer to its origin";
+         << std::ceil(11 * share / kMostRounding) / 10
+         << " times this tolerance, or move the mesh nearer to its origin";
     throw InvalidInput(text.str(), "tolerance_too_small");
   }
   if (share <= 0.01) return std::nullopt;
