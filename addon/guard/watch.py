@@ -112,11 +112,11 @@ class Faces:
         found = solidity.crossing_pairs(MeshArrays(positions, triangles, None, None), threads, progress, _MOST_PAIRS)
         return len(solidity.polygon_pairs(found, polygons[of_face]))
 
-    def any_flat(self, positions):
-        """Whether a polygon has no area, as those have that an extrusion makes until what was extruded is moved."""
+    def flat_count(self, positions):
+        """The number of polygons without an area, as those are that an extrusion makes until what was extruded is moved."""
         corners = positions[self.shown]
         areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-        return bool((np.bincount(self.shown_polygons, areas) == 0).any())
+        return int((np.bincount(self.shown_polygons, areas) == 0).sum())
 
     def outside(self, built, positions, options):
         """Returns how many polygons are outside in the triangulation that Blender shows. options: of a check."""
@@ -212,10 +212,9 @@ class Watch(Preparing):
             built = volumes.native_volume(reference, tolerance, threads, progress)
             options = {"to_world": matrix, "threads": threads, "progress": progress}
             keep = {"two_sided": two_sided, "outside": "keep", "crossings": crossings}
-            if edits_faces and faces.any_flat(positions):
-                keep["max_normal_angle"] = (
-                    180.0  # The walls of an extrusion stand upright on the reference, or lean over.
-                )
+            # The walls of an extrusion stand upright on the reference: the rule of the angle would hold them where they are.
+            if accepted is not None and faces.flat_count(positions) > accepted[0].flat_count(accepted[1]):
+                keep["max_normal_angle"] = 180.0
             rows, polygons = faces.guarded
             guard = native.module.Guard(positions, rows, built, **keep, **options)
             # A concave or bent quad may be inside in its present triangulation and outside in the other one. The guard keeps the

@@ -135,7 +135,7 @@ class JobOperator:
         """Whether another run is at work, which is reported."""
         other = under_way()
         if other:
-            # The status bar, which shows other reports, shows the progress, and a popup would take Esc.
+            # Blender shows reports in the status bar, which the progress covers now. A popup would catch Esc.
             other.ask_to_wait()
             self.report({"WARNING"}, f"{other.label} is at work: wait until it ends, or press Esc")
         return other is not None

@@ -20,7 +20,7 @@ PATIENCE = 0.1
 # So long after its beginning the status bar shows a job, so that no line flashes up for a short one.
 _QUIET = 0.4
 _TICK = 0.1
-_ASKS = 4.0  # seconds, in which the words are read that another operator has to wait
+_ASKS = 4.0  # For so many seconds the panel and the status bar say that another operator has to wait.
 
 # steps() of an operator yields this in place of work once nothing is left to do but to change Blender's data.
 WRITE = object()
@@ -66,7 +66,7 @@ class Run:
             return progress_text.stopping(self.label)
         told = progress_text.tell(self.operator, self.progress, self._clock)
         asked = told.escape and time.monotonic() < self._asked_to_wait + _ASKS
-        return replace(told, count="Wait for the end, or press Esc") if asked else told
+        return replace(told, count="another operation has to wait") if asked else told
 
     def ask_to_wait(self):
         """Lets the panel and the status bar say for a while that another operator has to wait."""

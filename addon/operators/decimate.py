@@ -74,8 +74,14 @@ def targets(context):
 
 
 def blocked_others(context):
-    """Returns [(name, why it cannot be decimated)] of those selected meshes that are not active, for the panel and poll()."""
-    return [(ob.name, reason) for ob in targets(context)[1:] if (reason := decimate_blocked(ob))]
+    """Yields for each selected mesh but the active one why it cannot be decimated, for the panel and poll()."""
+    for ob in targets(context)[1:]:
+        if reason := decimate_blocked(ob):
+            yield _with_name(ob, reason)
+
+
+def _with_name(ob, reason):
+    return reason if ob.name in reason else f"{ob.name}: {reason}"
 
 
 def _choose_placement(operator, _context):
@@ -102,8 +108,7 @@ object. An object without a reference gets one first, as by Set Reference"""
 
     @classmethod
     def poll(cls, context):
-        others = (f"{name}: {reason}" for name, reason in blocked_others(context))
-        return allowed(cls, decimate_blocked(context.active_object) or next(others, None))
+        return allowed(cls, decimate_blocked(context.active_object) or next(blocked_others(context), None))
 
     def draw(self, context):
         layout = self.layout
@@ -126,7 +131,7 @@ object. An object without a reference gets one first, as by Set Reference"""
         tasks = []
         for ob in self.objects:
             if reason := decimate_blocked(ob):
-                raise Refused(f"{ob.name}: {reason}")
+                raise Refused(_with_name(ob, reason))
             tasks.append((yield from self._task(context, ob)))
         # The tolerance is stored in the other unit too, so that changing the unit in Adjust Last Operation keeps it.
         other = "PERCENT" if self.tolerance_mode == "LENGTH" else "LENGTH"

@@ -47,7 +47,7 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
     @classmethod
     def poll(cls, context):
         ob = context.active_object
-        # Scripts name the lattice when they call the operator.
+        # A script may name any lattice of the file in the call, so that none needs to be chosen.
         none = not any(other.type == "LATTICE" for other in bpy.data.objects)
         return allowed(cls, decimate_blocked(ob) or ("Add a lattice first: Add > Lattice" if none else None))
 

@@ -13,7 +13,7 @@ from mathutils import Matrix
 
 from .. import status_bar
 from ..proof import last_run
-from ..reference import originals, snapshots
+from ..reference import instances, originals, snapshots
 from .asking import ask
 from .blocked import allowed, mesh_blocked, object_blocked
 
@@ -78,7 +78,8 @@ class _Shown:
         self.ob = ob
         self._was_hidden, self._was_selected = ob.hide_get(), ob.select_get()
         self.twin = twin_of(ob, originals.kept(ob))
-        self.twin.name = f".{ob.name} original, shown"
+        self.twin.name = f".{ob.name} original"
+        self.twin[instances.SHOWN] = True
         _link(context, ob, self.twin)
         ob.hide_set(True)
         for handlers in _handlers():

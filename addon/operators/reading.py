@@ -6,8 +6,8 @@ from ..reference import snapshots
 
 
 def mesh_and_reference(ob):
-    """A generator for an operator's steps(): returns two Surfaces, which belong to one place of the object although it may be
-    moved between the two parts."""
+    """A generator for an operator's steps(): returns the mesh and the reference as Surfaces. Both are for the place that the
+    object had when the mesh was read, even if the object is moved before the reference is read."""
     surface = snapshots.surface_of(ob)
     yield breathe
     reference = snapshots.reference_of(ob, surface)

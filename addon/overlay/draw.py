@@ -200,12 +200,15 @@ def legend_of_one(context, shown):
 
 
 def judged(context, objects):
-    """Returns what the verdict of these objects is of, as text, or "" if it is of what is coloured and the panel has it, too."""
-    active = context.active_object
+    """Returns words for the legend that say what its verdict is about, or "" if it is about the coloured surface and the
+    active object."""
+    active, words = context.active_object, []
     if active is not None and active.type == "MESH" and active not in objects:
-        return "of another object" if len(objects) == 1 else "of other objects"
+        words.append("of another object" if len(objects) == 1 else "of other objects")
     names = [name for ob in objects if ob.mode != "SCULPT" for name in measurements.on_top(ob)]
-    return f"without {' and '.join(dict.fromkeys(names))}" if names else ""
+    if names:
+        words.append(f"without {' and '.join(dict.fromkeys(names))}")
+    return ", ".join(words)
 
 
 def note(ob):

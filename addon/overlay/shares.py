@@ -103,7 +103,7 @@ def _samples(vertices, triangles):
 
 
 def _measure(tree, vertices, triangles, to_world, progress):
-    """Returns the largest distance at a sample, rounded up. Between the samples it may be larger by little."""
+    """Returns the largest distance at a sample, rounded up. Inside a large face between the samples it may be larger."""
     samples = _samples(vertices, triangles)
     largest = np.abs(tree.signed_distance(samples, to_world=to_world, progress=progress)).max()
     return rounded_up(float(largest)) if largest > tree.ROUNDING / tree.scale else None

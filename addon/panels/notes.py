@@ -41,8 +41,10 @@ def notes(context, ob):
     if reason := in_the_way(ob):
         lines.append((reason, "ERROR"))
     # The button Decimate is greyed, because it would decimate all selected meshes.
-    others = blocked_others(context) if ob.mode == "OBJECT" else []
-    lines += [(f"{name}: {reason}", "ERROR") for name, reason in others[:_MOST_OTHERS]]
+    others = [*blocked_others(context)] if ob.mode == "OBJECT" else []
+    lines += [(reason, "ERROR") for reason in others[:_MOST_OTHERS]]
+    if more := len(others[_MOST_OTHERS:]):
+        lines.append((f"{more:,} more of the selected meshes cannot be decimated", "ERROR"))
     if needs := memory.told(ob):
         sentence, is_too_much = needs
         lines.append((sentence, "ERROR" if is_too_much else "INFO"))

@@ -23,7 +23,7 @@ def draw_progress(context, box, told):
             column.progress(factor=told.share, text=text)
         else:
             column.label(text=text)
-    column.label(text=fitting(context, told.count, told.count.rsplit(", ", 1)[0]))
+    column.label(text=fitting(context, told.count, ", ".join(told.count.split(", ")[:2])))
     column.label(text=f"Esc: {told.escape}" if told.escape else "")
 
 

@@ -7,6 +7,9 @@ from bpy.app.handlers import persistent
 
 from .. import handlers
 
+# A custom property of the object that Show Original shows, which has such a mesh, too.
+SHOWN = "tolvol.shown"
+
 _count = 0  # of all objects, when they were looked at last
 
 
@@ -16,7 +19,7 @@ def made_by_append():
     return [
         ob
         for ob in bpy.data.objects
-        if ob.type == "MESH" and ob.library is None and ob.data in meshes and ob.name == ob.data.name
+        if ob.type == "MESH" and not ob.library and ob.data in meshes and ob.name == ob.data.name and SHOWN not in ob
     ]
 
 
@@ -39,7 +42,7 @@ _HANDLERS = (("depsgraph_update_post", _look),)
 
 
 def register():
-    if not bpy.app.background:  # Scripts name what they append, and timers do not run there.
+    if not bpy.app.background:  # Timers do not run there.
         handlers.add(_HANDLERS)
 
 

@@ -246,7 +246,7 @@ def test_legend_says_what_no_proof_covers():
     assert draw.note(ob) == "Colours without its modifiers, not proved" and draw.judged(bpy.context, [ob]) == ""
     bpy.ops.object.mode_set(mode="OBJECT")
     sheet()  # It is the active object now, whose verdict the panel shows.
-    assert draw.judged(bpy.context, [ob]) == "of another object"
+    assert draw.judged(bpy.context, [ob]) == "of another object, without modifiers and shape keys"
 
 
 def test_drawing_that_was_refused_is_asked_for_again_once_it_is_turned_on_anew(chosen_preferences):

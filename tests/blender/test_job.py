@@ -339,7 +339,7 @@ def test_a_second_job_waits_for_the_first(waiting):
     second = type("Second", (Modal,), {"__init__": lambda self: None})()
     assert second.invoke(None, None) == {"CANCELLED"}
     assert second.said == "Modal is at work: wait until it ends, or press Esc"
-    assert waiting[0]._run.told().count == "Wait for the end, or press Esc"
+    assert waiting[0]._run.told().count == "another operation has to wait"
 
 
 class Progress:

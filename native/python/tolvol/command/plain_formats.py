@@ -45,21 +45,32 @@ def _read(extension, data):
     return {".off": off_file, ".ply": ply_file, ".stl": stl_file}[extension].read(data)
 
 
+def _colours(channels):
+    """Returns the colours of the vertices, uint8 if all channels are whole numbers, else float32 from 0 to 1.
+
+    Whole numbers go from 0 to 255, others from 0 to 1. It returns None if a number is beyond that.
+    """
+    whole = [channel.dtype.kind in "iu" for channel in channels]
+    for channel, is_whole in zip(channels, whole):
+        if channel.min(initial=0) < 0 or channel.max(initial=0) > (255 if is_whole else 1 + 1 / 255):
+            return None
+    if all(whole):
+        return np.stack(channels, 1).astype(np.uint8)
+    return np.stack([channel / (255 if each else 1) for channel, each in zip(channels, whole)], 1).astype(np.float32)
+
+
 def _attributes(content, triangles, places):
-    """Returns (attributes, words for what is left out)."""
+    """Returns (attributes, a list of words for what is left out)."""
     columns, found, others = dict(content.columns), {}, []
     for kind, *choices in (("normals", _NORMALS), ("colours", _COLOURS, _COLOURS[:3]), ("UVs", *_UVS)):
         names = next((names for names in choices if all(name in columns for name in names)), None)
         if names:
-            values = np.stack([columns.pop(name) for name in names], 1)
-            values = values.astype(values.dtype.newbyteorder("="))
-            if kind == "colours" and values.dtype.kind in "iu":
-                if values.min(initial=0) < 0 or values.max(initial=0) > 255:
-                    others.append("its colours, some of which are not between 0 and 255")
-                    continue
-                found[kind] = Attribute(values.astype(np.uint8), triangles)
+            channels = [columns.pop(name) for name in names]
+            values = _colours(channels) if kind == "colours" else np.stack(channels, 1).astype(np.float32)
+            if values is None:
+                others.append("its colours, some of which are beyond their range")
             else:
-                found[kind] = Attribute(values.astype(np.float32), triangles)
+                found[kind] = Attribute(values, triangles)
     for kind, pair in (("UVs", content.uvs), ("normals", content.normals)):
         if pair is not None:
             found[kind] = Attribute(pair[0], pair[1][places].astype(np.int32), split=True)
