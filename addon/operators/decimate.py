@@ -81,7 +81,7 @@ def blocked_others(context):
 
 
 def _with_name(ob, reason):
-    return reason if ob.name in reason else f"{ob.name}: {reason}"
+    return reason if reason.startswith(f"{ob.name} ") else f"{ob.name}: {reason}"
 
 
 def _choose_placement(operator, _context):
