@@ -15,7 +15,7 @@ from .wrapping import text_lines
 TOLERANCE = 0.2
 # The options of all properties that hold a tolerance in percent of the size.
 PERCENT = {
-    "min": 1e-5,  # The field shows as many digits. No float32 mesh can hold less than a third of it.
+    "min": 1e-5,  # The field shows as many digits. float32 cannot hold a third of it.
     "max": 100.0,
     "soft_min": 0.01,
     "soft_max": 2.0,  # The slider is as wide as the panel: the less it spans, the finer it is to drag.

@@ -59,7 +59,9 @@ def medians(runs, *works):
 
 
 def quads_and_triangles(path, mesh):
-    """Writes a file in which every other pair of triangles is a quad, as the lists of a remeshed scan are of two lengths."""
+    """Writes a file in which every other pair of triangles is a quad, as the lists of a remeshed scan are of two lengths.
+
+    Every fourth triangle is left out."""
     triangles = mesh.triangles[: len(mesh.triangles) // 4 * 4].reshape(-1, 4, 3)
     rows = np.empty(len(triangles), [("4", "u1"), ("quad", "<i4", 4), ("3", "u1"), ("triangle", "<i4", 3)])
     rows["4"], rows["3"] = 4, 3

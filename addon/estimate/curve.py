@@ -19,8 +19,8 @@ _FINEST, _COARSEST = _ON_LADDER / STEP**5, _ON_LADDER * STEP**6
 _CLOSE = 1.2
 # Tolerances that differ by a smaller factor count as the same.
 _SAME = 1 + 1e-6
-# Below the tolerance that leaves this share of the triangles, finer ones leave hardly more. Those that are finer by the
-# factor may be refused, because float32 cannot hold them.
+# Below the tolerance that leaves this share of the triangles, finer ones leave hardly more. One that is finer by more than
+# the factor is not estimated from it, because float32 may not hold it, and Decimate then refuses it.
 _NEARLY_ALL, _FINER = 0.9, 100.0
 # For meshes of more than so many triangles, the ladder goes on towards finer tolerances, which take longer, only while a
 # decimation takes at most so many seconds.

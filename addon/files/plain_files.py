@@ -39,7 +39,7 @@ def _mesh(name, content):
     columns = content.columns
     colours = [*_COLOURS, *([_ALPHA] if _ALPHA in columns else [])]
     has_uvs, has_colours = (columns.keys() >= set(names) for names in (_UVS, colours))
-    # A text may give whole numbers as fractions, and then they are read as float64.
+    # Where the header of a text declares whole numbers and fractions follow, the numbers are float64.
     if has_colours and any(columns[channel].dtype.itemsize == 8 for channel in colours):
         return None
     corners = content.corners
@@ -61,8 +61,8 @@ def _mesh(name, content):
 
 
 def _turned(corners, sizes):
-    """Returns the corners with the faces turned which that reader turns where there are UVs or colours: no triangle or quad has
-    the vertex 0 as its third or fourth corner."""
+    """Returns the corners as Blender's reader stores them where there are UVs or colours: it turns triangles and quads so that
+    the vertex 0 is never the third or fourth corner."""
     turned, starts = corners.copy(), np.cumsum(sizes) - sizes
     for size, last, shift in ((3, [2], 1), (4, [2, 3], 2)):
         first = starts[sizes == size]

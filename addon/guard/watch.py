@@ -17,7 +17,7 @@ from ..reference import snapshots, tolerances
 from ..shared import volumes
 from ..shared.errors import Refused
 from ..shared.proof import solidity
-from ..shared.surface import MeshArrays
+from ..shared.surface import MeshArrays, areas
 
 # Blender waits so many seconds for a guard to be prepared. If preparing takes longer, it goes on in a thread.
 _PATIENCE = 0.4
@@ -114,9 +114,7 @@ class Faces:
 
     def flat_count(self, positions):
         """The number of polygons without an area, as those are that an extrusion makes until what was extruded is moved."""
-        corners = positions[self.shown]
-        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-        return int((np.bincount(self.shown_polygons, areas) == 0).sum())
+        return int((np.bincount(self.shown_polygons, areas(positions[self.shown])) == 0).sum())
 
     def outside(self, built, positions, options):
         """Returns how many polygons are outside in the triangulation that Blender shows. options: of a check."""

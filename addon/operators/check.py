@@ -17,7 +17,7 @@ from ..shared.proof import measure, report
 from ..shared.proof.certify import outside
 from ..shared.proof.verdict import BEYOND, ONE_WAY, WITHIN, Verdict
 from .blocked import allowed, check_blocked
-from .reading import mesh_and_reference
+from .mesh_and_reference import mesh_and_reference
 from .staying import show_selected
 
 

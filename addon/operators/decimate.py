@@ -19,7 +19,7 @@ from ..wrapping import fits_tick, property_fields
 from . import decimation, original
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
-from .reading import mesh_and_reference
+from .mesh_and_reference import mesh_and_reference
 
 
 def draw_decimate_settings(layout, settings):

@@ -48,8 +48,9 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
     def poll(cls, context):
         ob = context.active_object
         # A script may name any lattice of the file in the call, so that none needs to be chosen.
-        none = not any(other.type == "LATTICE" for other in bpy.data.objects)
-        return allowed(cls, decimate_blocked(ob) or ("Add a lattice first: Add > Lattice" if none else None))
+        return allowed(
+            cls, decimate_blocked(ob) or (None if bpy.data.lattices else "Add a lattice first: Add > Lattice")
+        )
 
     def draw(self, _context):
         self.layout.use_property_split = True

@@ -20,8 +20,8 @@ from ..shared.proof.verdict import Verdict
 from ..shared.surface import Surface
 from . import decimation, fit
 from . import settings as shared
+from .mesh_and_reference import mesh_and_reference
 from .modifiers import ModifierOperator
-from .reading import mesh_and_reference
 
 
 class TOLVOL_OT_fit_modifier(ModifierOperator, bpy.types.Operator):

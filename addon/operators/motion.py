@@ -17,7 +17,7 @@ from ..shared.proof import report, solidity
 from ..shared.proof.certify import certify
 from ..shared.proof.verdict import Interval, Verdict
 from ..shared.surface import Surface
-from .reading import mesh_and_reference
+from .mesh_and_reference import mesh_and_reference
 
 _FOUND = {"forward": "the result is {} from the reference", "backward": "the reference is {} from the result"}
 

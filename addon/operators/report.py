@@ -22,7 +22,7 @@ from ..shared.surface import Surface
 from ..units import chosen_unit
 from .blocked import allowed, check_blocked
 from .decimate import targets
-from .reading import mesh_and_reference
+from .mesh_and_reference import mesh_and_reference
 
 # The report gives the share of the area in the bands between these shares of the tolerance.
 _BANDS = (0.25, 0.5, 0.75)

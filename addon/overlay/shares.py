@@ -9,6 +9,7 @@ import numpy as np
 
 from ..background import queue
 from ..redraw import redraw_views
+from ..shared.surface import areas
 from .scale import rounded_up
 
 _EVERY = 0.25  # seconds between two counts while a mesh goes on changing
@@ -86,8 +87,7 @@ def _count(scale, tree, vertices, triangles, to_world, progress):
     counted = tree.shares(vertices, triangles, scale.edges(), to_world=to_world, progress=progress)
     *bands, outside = scale.fold(counted)
     corners = vertices.astype(np.float64)[triangles] @ to_world[:3, :3].T
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
-    return Shares(bands, outside, scale.histogram(counted), float(area))
+    return Shares(bands, outside, scale.histogram(counted), float(areas(corners).sum()))
 
 
 def _samples(vertices, triangles):

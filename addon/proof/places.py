@@ -14,6 +14,7 @@ from ..reference import measurements, snapshots, tolerances
 from ..shared import volumes
 from ..shared.proof import certify, measure, report
 from ..shared.proof.verdict import Interval
+from ..shared.surface import areas
 from ..units import area, length
 from . import regions
 
@@ -157,7 +158,6 @@ def _place(on_reference, corners, distance, pieces, beyond=0, share=0.0):
     corners: (3, 3) of the triangle with the largest distance; pieces: (k, 3, 3) the corners of all pieces of the region;
     beyond: the number of triangles of a region that is beyond the tolerance; share: that of its area which is beyond.
     """
-    areas = np.linalg.norm(np.cross(pieces[:, 1] - pieces[:, 0], pieces[:, 2] - pieces[:, 0]), axis=1) / 2
     a, b, c = corners
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal)
@@ -170,7 +170,7 @@ def _place(on_reference, corners, distance, pieces, beyond=0, share=0.0):
         position,
         normal / length if length else normal,
         float(radius),
-        float(areas.sum() * share),
+        float(areas(pieces).sum() * share),
         beyond,
     )
 
@@ -224,7 +224,7 @@ def shown(ob):
 
 def described(context, ob):
     """Returns what is known about the present place as lines of text, or [] if none is shown."""
-    found, at, regions = shown(ob)
+    found, at, count = shown(ob)
     if not found:
         return []
     place = found[at]
@@ -236,7 +236,7 @@ def described(context, ob):
     ]
     if place.beyond:
         faces = "1 triangle" if place.faces == 1 else f"{place.faces:,} triangles"
-        more = f"; {regions:,} regions in all" if regions > len(found) else ""
+        more = f"; {count:,} regions in all" if count > len(found) else ""
         beyond = f", of which {area(context, place.area)} are beyond" if place.area > 0 else ""
         lines.append(f"Not proved to be within: {faces}{beyond}{more}")
     else:

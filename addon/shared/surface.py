@@ -25,6 +25,11 @@ class MeshArrays:
         return digest.hexdigest()
 
 
+def areas(corners):
+    """Returns the areas of triangles, (k,). corners: (k, 3, 3), in any lengths."""
+    return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+
+
 @dataclass(frozen=True)
 class Surface:
     """A mesh and its place in the world."""

@@ -18,8 +18,8 @@ constexpr Seconds kGlance(0.01);
 /// Nobody waits longer than this.
 constexpr Seconds kLongest(1e9);
 
-/// Signals are looked for once in this time.
-constexpr Seconds kBetweenLooks(0.05);
+/// A wait lasts so long. Signals are looked for after each.
+constexpr Seconds kOneWait(0.05);
 
 thread_local bool is_worker = false;
 
@@ -82,13 +82,13 @@ Turns& turns() {
 /// Waits for `done` in short times, and looks for signals between them. Needs the GIL.
 template <class Done>
 bool wait_for(Seconds time, const Done& done) {
-  for (Seconds left = std::clamp(time, Seconds(0), kLongest);; left -= kBetweenLooks) {
+  for (Seconds left = std::clamp(time, Seconds(0), kLongest);; left -= kOneWait) {
     {
       const WithoutPython released;
-      if (turns().give(std::min(left, kBetweenLooks), done)) return true;
+      if (turns().give(std::min(left, kOneWait), done)) return true;
     }
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    if (left <= kBetweenLooks) return false;
+    if (left <= kOneWait) return false;
   }
 }
 

@@ -295,11 +295,13 @@ def test_all_events_but_esc_are_passed_on(waiting):
 def test_an_error_while_an_event_is_handled_ends_the_run(waiting, monkeypatch, kind):
     operator, go = waiting
     go.set()  # Its end is waited for.
+    operator._run._job.done(None)
 
     def fail(*_):
         raise RuntimeError("unexpected")
 
-    monkeypatch.setattr(Run, "_look", fail)
+    failing = {"ESC": (Modal, "improving"), "TIMER": (Run, "go_on"), "MOUSEMOVE": (Run, "_look")}
+    monkeypatch.setattr(*failing[kind], fail)
     context = Context()
     with pytest.raises(RuntimeError, match="unexpected"):
         operator.modal(context, event(kind))

@@ -140,6 +140,19 @@ def test_lists_of_any_type_among_other_numbers(order, lengths, counted, index, e
         ply_file.read(head.encode() + body + b"ab")
 
 
+def one_triangle(path, form, kinds, rows):
+    """Writes a PLY file of one triangle. rows: its vertices, a structured array; kinds: the types as PLY names them."""
+    properties = "".join(f"property {kind} {name}\n" for name, kind in zip(rows.dtype.names, kinds))
+    head = f"ply\nformat {form} 1.0\nelement vertex 3\n{properties}"
+    head += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    if form == "ascii":
+        body = "".join(" ".join(f"{value}" for value in row) + "\n" for row in rows.tolist()).encode() + b"3 0 1 2\n"
+    else:
+        body = rows.tobytes() + b"\3" + np.arange(3, dtype="<i4").tobytes()
+    path.write_bytes(head.encode() + body)
+    return path
+
+
 @pytest.mark.parametrize(
     "types, exact",
     [("float float float", False), ("short uchar char", False)]
@@ -152,15 +165,7 @@ def test_positions_are_held_exactly_whatever_types_they_have(tmp_path, types, ex
     rows = np.zeros(3, [(axis, ply_file._PLY_TYPES[kind]) for axis, kind in zip("xyz", types)])
     for i, (axis, kind) in enumerate(zip("xyz", types)):
         rows[axis][i] = large if kind in ("int", "uint", "double") else 3
-    head = f"ply\nformat {form} 1.0\nelement vertex 3\n"
-    head += "".join(f"property {kind} {axis}\n" for axis, kind in zip("xyz", types))
-    head += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
-    if form == "ascii":
-        body = "".join(" ".join(f"{value}" for value in row) + "\n" for row in rows.tolist()).encode() + b"3 0 1 2\n"
-    else:
-        body = rows.tobytes() + b"\3" + np.arange(3, dtype="<i4").tobytes()
-    (tmp_path / "a.ply").write_bytes(head.encode() + body)
-    vertices = read(tmp_path / "a.ply").vertices
+    vertices = read(one_triangle(tmp_path / "a.ply", form, types, rows)).vertices
     assert vertices.dtype == (np.float64 if exact else np.float32)
     assert vertices.tolist() == [list(row) for row in rows.tolist()]
     if form != "ascii":
@@ -189,15 +194,7 @@ def test_colours_keep_their_values_or_are_left_out(tmp_path, form, kind, values,
         rows[axis][i] = 1
     for name, value in zip(names, values):
         rows[name] = value
-    head = f"ply\nformat {form} 1.0\nelement vertex 3\n" + "".join(f"property float {axis}\n" for axis in "xyz")
-    head += "".join(f"property {kind} {name}\n" for name in names)
-    head += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
-    if form == "ascii":
-        body = "".join(" ".join(f"{value}" for value in row) + "\n" for row in rows.tolist()).encode() + b"3 0 1 2\n"
-    else:
-        body = rows.tobytes() + b"\3" + np.arange(3, dtype="<i4").tobytes()
-    (tmp_path / "a.ply").write_bytes(head.encode() + body)
-    mesh = read(tmp_path / "a.ply")
+    mesh = read(one_triangle(tmp_path / "a.ply", form, ["float"] * 3 + [kind] * 3, rows))
     if found is None:
         assert not mesh.attributes and mesh.others == ("its colours, some of which are beyond their range",)
     else:

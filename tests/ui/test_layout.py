@@ -110,6 +110,7 @@ def _no_button_moves(operator, *buttons):
             yield from press("tolvol.smooth")
             yield
             screenshot("layout 9 second job")
+            assert job.under_way().told().count == "another operation has to wait"
         released.append(True)
     yield from finished(lambda: not job.under_way())
     assert (yield from rows(*buttons)) == before

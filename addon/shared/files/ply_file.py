@@ -21,7 +21,7 @@ _PLY_TYPES = {
     **dict.fromkeys(("double", "float64"), "f8"),
 }
 
-_EXACT = {"f8", "i4", "u4"}  # the types of numbers that float32 cannot hold
+_NEED_FLOAT64 = {"f8", "i4", "u4"}  # the types of numbers that float32 cannot hold
 
 _BLANK = b" \t\r\n\0"  # Some programs end a file with an empty line, or fill it up.
 
@@ -84,7 +84,7 @@ def require_end(rest, more=0):
 def position_type(properties):
     """Returns the type that holds the positions of vertices with these properties exactly: np.float32 or np.float64."""
     kinds = {kind for field, _, kind in properties if field in ("x", "y", "z")}
-    return np.float64 if kinds & _EXACT else np.float32
+    return np.float64 if kinds & _NEED_FLOAT64 else np.float32
 
 
 def _columns(rows, declared):
@@ -208,7 +208,7 @@ def _ply_element(body, offset, count, properties, order):
     for field, counted, kind in properties:
         if counted:
             length = np.frombuffer(body, order + counted, 1, start)[0] if count else 0
-            if not 0 <= length <= len(body):  # Nor is it then a number.
+            if not 0 <= length <= len(body):  # This also refuses NaN.
                 raise ValueError
             lengths[field] = int(length)
             start += np.dtype(counted).itemsize
